@@ -1,0 +1,25 @@
+// A planar laser scan as a driver delivers it, without any middleware's type.
+#pragma once
+
+#include <chrono>
+#include <vector>
+
+namespace sckf {
+
+/// Time since the epoch. Integral, so that equal stamps are equal.
+using Stamp = std::chrono::nanoseconds;
+
+inline double seconds(Stamp duration) { return std::chrono::duration<double>(duration).count(); }
+
+/// Beam i looks along angle_min + i · angle_increment in the plane of the laser, counter-clockwise about its z axis.
+/// A range that is not finite or not within [range_min, range_max] is "no reading" (REP-117).
+struct LaserScan {
+  Stamp stamp{0};
+  double angle_min = 0.0;        ///< [rad]
+  double angle_increment = 0.0;  ///< [rad], may be negative, not zero
+  double range_min = 0.0;        ///< [m]
+  double range_max = 0.0;        ///< [m]
+  std::vector<float> ranges;     ///< [m]
+};
+
+}  // namespace sckf

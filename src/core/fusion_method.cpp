@@ -1,0 +1,22 @@
+#include "sckf_odometry/core/fusion_method.h"
+
+#include "sckf_odometry/core/dead_reckoning.h"
+#include "sckf_odometry/core/stochastic_cloning_filter.h"
+
+namespace sckf {
+
+const std::vector<std::string>& fusionMethodNames() {
+  static const std::vector<std::string> names{"sckf", "sckf_nc", "dead_reckoning"};
+  return names;
+}
+
+std::unique_ptr<FusionMethod> makeFusionMethod(const std::string& name, const SE2& odom_from_base,
+                                               const Eigen::Matrix3d& covariance) {
+  using Filter = StochasticCloningFilter;
+  if (name == "sckf") return std::make_unique<Filter>(odom_from_base, covariance, Filter::Correlations::kKept);
+  if (name == "sckf_nc") return std::make_unique<Filter>(odom_from_base, covariance, Filter::Correlations::kIgnored);
+  if (name == "dead_reckoning") return std::make_unique<DeadReckoning>(odom_from_base, covariance);
+  return nullptr;
+}
+
+}  // namespace sckf
