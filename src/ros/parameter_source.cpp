@@ -1,0 +1,99 @@
+#include "sckf_odometry/ros/parameter_source.h"
+
+#include <XmlRpcValue.h>
+#include <ros/param.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <sstream>
+#include <stdexcept>
+
+namespace sckf {
+
+namespace {
+
+using Values = std::map<std::string, ParameterValue>;
+
+std::string joined(const std::string& group, const std::string& name) {
+  return group.empty() ? name : group + "/" + name;
+}
+
+void collect(const std::string& name, XmlRpc::XmlRpcValue& node, Values& values) {
+  std::ostringstream text;
+  node.write(text);
+  switch (node.getType()) {
+    case XmlRpc::XmlRpcValue::TypeStruct:
+      for (auto& [key, member] : node) collect(joined(name, key), member, values);
+      break;
+    case XmlRpc::XmlRpcValue::TypeBoolean: {
+      const bool value = static_cast<bool&>(node);
+      values[name] = {value, value ? "true" : "false"};
+      break;
+    }
+    case XmlRpc::XmlRpcValue::TypeInt:
+      values[name] = {static_cast<int&>(node), text.str()};
+      break;
+    case XmlRpc::XmlRpcValue::TypeDouble:
+      text.str("");
+      text << static_cast<double&>(node);
+      values[name] = {static_cast<double&>(node), text.str()};
+      break;
+    case XmlRpc::XmlRpcValue::TypeString: {
+      const auto& value = static_cast<std::string&>(node);
+      values[name] = {value, "\"" + value + "\""};
+      break;
+    }
+    default:
+      values[name] = {ParameterValue::List(), text.str()};
+  }
+}
+
+/// A plain scalar has the type that rosparam (YAML 1.1) gives it; only quoted ones are texts in any case.
+ParameterValue scalar(const YAML::Node& node) {
+  const std::string text = node.Scalar();
+  const bool quoted = node.Tag() == "!";
+  static const std::vector<std::string> kTrue{"true", "True", "TRUE", "yes", "Yes", "YES", "on", "On", "ON"};
+  static const std::vector<std::string> kFalse{"false", "False", "FALSE", "no", "No", "NO", "off", "Off", "OFF"};
+  if (!quoted) {
+    if (std::find(kTrue.begin(), kTrue.end(), text) != kTrue.end()) return {true, text};
+    if (std::find(kFalse.begin(), kFalse.end(), text) != kFalse.end()) return {false, text};
+    int whole = 0;
+    if (YAML::convert<int>::decode(node, whole)) return {whole, text};
+    double number = 0.0;
+    if (YAML::convert<double>::decode(node, number)) return {number, text};
+  }
+  return {text, "\"" + text + "\""};
+}
+
+void collect(const std::string& name, const YAML::Node& node, Values& values) {
+  if (node.IsMap()) {
+    for (const auto& entry : node) collect(joined(name, entry.first.as<std::string>()), entry.second, values);
+  } else if (node.IsScalar()) {
+    values[name] = scalar(node);
+  } else {
+    values[name] = {ParameterValue::List(), YAML::Dump(node)};
+  }
+}
+
+}  // namespace
+
+std::map<std::string, ParameterValue> ParameterServer::values() const {
+  Values values;
+  XmlRpc::XmlRpcValue root;
+  if (private_nh_.getParam(private_nh_.getNamespace(), root) && root.getType() == XmlRpc::XmlRpcValue::TypeStruct) {
+    collect("", root, values);
+  }
+  return values;
+}
+
+ParameterFile::ParameterFile(const std::string& path) {
+  try {
+    const YAML::Node root = YAML::LoadFile(path);
+    if (!root.IsMap() && !root.IsNull()) throw YAML::Exception(root.Mark(), "not a list of \"name: value\"");
+    if (root.IsMap()) collect("", root, values_);
+  } catch (const YAML::Exception& exception) {
+    throw std::invalid_argument("parameter file " + path + ": " + exception.what());
+  }
+}
+
+}  // namespace sckf

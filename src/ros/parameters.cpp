@@ -1,0 +1,132 @@
+#include "sckf_odometry/ros/parameters.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+
+#include "sckf_odometry/ros/conversions.h"
+
+namespace sckf {
+
+namespace {
+
+bool isNumber(const Parameter& parameter) {
+  return !std::holds_alternative<bool*>(parameter.field) && !std::holds_alternative<std::string*>(parameter.field);
+}
+
+bool isWhole(const Parameter& parameter) {
+  return std::holds_alternative<int*>(parameter.field) || std::holds_alternative<std::size_t*>(parameter.field);
+}
+
+std::string expectation(const Parameter& parameter) {
+  if (std::holds_alternative<bool*>(parameter.field)) return "true or false";
+  if (!isNumber(parameter)) {
+    if (parameter.choices.empty()) return "a text that is not empty";
+    std::string text = "one of";
+    for (const std::string& choice : parameter.choices) text += " \"" + choice + "\"";
+    return text;
+  }
+  const std::string unit = parameter.unit.empty() ? "" : " " + parameter.unit;
+  return (isWhole(parameter) ? "a whole number " : "a number ") + parameter.range.text() + unit;
+}
+
+/// A number that YAML 1.1 takes for a text, as 1e-3 without a point, is still a number.
+std::optional<double> number(const ParameterValue& value) {
+  if (const auto* whole = std::get_if<int>(&value.value)) return *whole;
+  if (const auto* real = std::get_if<double>(&value.value)) return *real;
+  if (const auto* text = std::get_if<std::string>(&value.value)) {
+    std::istringstream stream(*text);
+    double real = 0.0;
+    if (stream >> real && stream.eof()) return real;
+  }
+  return std::nullopt;
+}
+
+bool assign(const Parameter& parameter, const ParameterValue& value) {
+  if (const auto* field = std::get_if<bool*>(&parameter.field)) {
+    const bool* flag = std::get_if<bool>(&value.value);
+    if (flag != nullptr) **field = *flag;
+    return flag != nullptr;
+  }
+  if (const auto* field = std::get_if<std::string*>(&parameter.field)) {
+    const auto* text = std::get_if<std::string>(&value.value);
+    if (text == nullptr || text->empty()) return false;
+    const auto& choices = parameter.choices;
+    if (!choices.empty() && std::find(choices.begin(), choices.end(), *text) == choices.end()) return false;
+    **field = *text;
+    return true;
+  }
+  if (isWhole(parameter) && !std::holds_alternative<int>(value.value)) return false;
+  const std::optional<double> real = number(value);
+  if (!real || !parameter.range.contains(*real)) return false;
+  if (const auto* field = std::get_if<int*>(&parameter.field)) **field = static_cast<int>(*real);
+  if (const auto* field = std::get_if<std::size_t*>(&parameter.field)) **field = static_cast<std::size_t>(*real);
+  if (const auto* field = std::get_if<double*>(&parameter.field)) **field = *real;
+  return true;
+}
+
+/// What no parameter says alone.
+void checkTogether(const Options& options, std::vector<std::string>& problems) {
+  const ScanOptions& scan = options.pipeline.scan;
+  const NodeOptions& node = options.node;
+  const auto ordered = [&problems](const std::string& low_name, double low, const std::string& high_name, double high) {
+    std::ostringstream text;
+    text << low_name << " = " << low << ": less than " << high_name << " = " << high << " expected";
+    if (low >= high) problems.push_back(text.str());
+  };
+  ordered("range_min", scan.range_min, "range_max", scan.range_max);
+  ordered("range_noise_min", scan.range_noise_min, "range_noise_max", scan.range_noise_max);
+  if (node.odom_frame == node.base_frame) {
+    problems.push_back("odom_frame = \"" + node.odom_frame + "\": another frame than base_frame expected");
+  }
+  if (node.use_tf_odometry && node.tf_odometry_frame == node.base_frame) {
+    problems.push_back("tf_odometry_frame = \"" + node.tf_odometry_frame +
+                       "\": another frame than base_frame expected");
+  }
+}
+
+}  // namespace
+
+bool Range::contains(double value) const {
+  if (!std::isfinite(value)) return false;
+  return (min_excluded ? value > min : value >= min) && (max_excluded ? value < max : value <= max);
+}
+
+std::string Range::text() const {
+  std::ostringstream text;
+  if (std::isinf(max)) {
+    text << (min_excluded ? "above " : "of at least ") << min;
+  } else {
+    text << "in " << (min_excluded ? "(" : "[") << min << ", " << max << (max_excluded ? ")" : "]");
+  }
+  return text.str();
+}
+
+Options readOptions(const ParameterSource& source, std::vector<std::string>* unknown) {
+  Options options;
+  std::vector<std::string> problems;
+  std::map<std::string, ParameterValue> values = source.values();
+  for (const Parameter& parameter : parameterList(options)) {
+    const auto given = values.find(parameter.name);
+    if (given == values.end()) continue;
+    if (!assign(parameter, given->second)) {
+      problems.push_back(parameter.name + " = " + given->second.text + ": " + expectation(parameter) + " expected");
+    }
+    values.erase(given);
+  }
+  if (unknown != nullptr) {
+    for (const auto& entry : values) unknown->push_back(entry.first);
+  }
+  NodeOptions& node = options.node;
+  for (std::string* frame : {&node.odom_frame, &node.base_frame, &node.tf_odometry_frame}) *frame = frameName(*frame);
+  checkTogether(options, problems);
+  if (problems.empty()) return options;
+  std::string text = "bad parameters:";
+  for (const std::string& problem : problems) text += "\n  " + problem;
+  throw std::invalid_argument(text);
+}
+
+}  // namespace sckf

@@ -1,0 +1,159 @@
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <fstream>
+#include <stdexcept>
+#include <variant>
+
+#include "sckf_odometry/ros/parameters.h"
+#include "text_matchers.h"
+
+namespace sckf {
+namespace {
+
+/// A parameter file that lives as long as the test.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const std::string& content) : path_(testing::TempDir() + "sckf_parameters.yaml") {
+    std::ofstream(path_) << content;
+  }
+  ~TemporaryFile() { std::remove(path_.c_str()); }
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+Options read(const std::string& yaml, std::vector<std::string>* unknown = nullptr) {
+  const TemporaryFile file(yaml);
+  return readOptions(ParameterFile(file.path()), unknown);
+}
+
+std::string refusal(const std::string& yaml) {
+  try {
+    read(yaml);
+  } catch (const std::invalid_argument& exception) {
+    return exception.what();
+  }
+  return "accepted";
+}
+
+/// The value that a parameter's field has.
+std::variant<bool, int, std::size_t, double, std::string> valueOf(const Parameter& parameter) {
+  return std::visit([](auto* field) { return std::variant<bool, int, std::size_t, double, std::string>(*field); },
+                    parameter.field);
+}
+
+TEST(Parameters, AnEmptyFileLeavesTheDefaults) {
+  Options read_options = read("");
+  Options defaults;
+  const auto got = parameterList(read_options);
+  const auto expected = parameterList(defaults);
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_EQ(valueOf(got[i]), valueOf(expected[i])) << got[i].name;
+}
+
+TEST(Parameters, TheDefaultsAreAllowed) {
+  Options defaults;
+  for (const Parameter& parameter : parameterList(defaults)) {
+    if (const auto* field = std::get_if<double*>(&parameter.field)) {
+      EXPECT_TRUE(parameter.range.contains(**field)) << parameter.name;
+    }
+    if (const auto* field = std::get_if<int*>(&parameter.field)) {
+      EXPECT_TRUE(parameter.range.contains(**field)) << parameter.name;
+    }
+    if (const auto* field = std::get_if<std::size_t*>(&parameter.field)) {
+      EXPECT_TRUE(parameter.range.contains(static_cast<double>(**field))) << parameter.name;
+    }
+  }
+}
+
+TEST(Parameters, TheConfiguredFileNamesEveryParameterWithItsDefault) {
+  const ParameterFile file(SCKF_CONFIG_FILE);
+  Options defaults;
+  for (const Parameter& parameter : parameterList(defaults)) {
+    EXPECT_EQ(file.values().count(parameter.name), 1u) << parameter.name << " is not in " << SCKF_CONFIG_FILE;
+  }
+  std::vector<std::string> unknown;
+  Options configured = readOptions(file, &unknown);
+  EXPECT_TRUE(unknown.empty());
+  const auto got = parameterList(configured);
+  const auto expected = parameterList(defaults);
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_EQ(valueOf(got[i]), valueOf(expected[i])) << got[i].name;
+}
+
+TEST(Parameters, EveryNameIsThereOnce) {
+  Options options;
+  std::map<std::string, int> count;
+  for (const Parameter& parameter : parameterList(options)) ++count[parameter.name];
+  for (const auto& [name, n] : count) EXPECT_EQ(n, 1) << name;
+}
+
+TEST(Parameters, EachKindOfValueReachesItsField) {
+  const Options options = read(
+      "odom_frame: sckf_odom\npublish_tf: no\nkf_dist_linear: 1\ngate_probability: 0.9\nmax_iterations: 7\n"
+      "max_waiting_scans: 3\nmethod: sckf_nc\n");
+  EXPECT_EQ(options.node.odom_frame, "sckf_odom");
+  EXPECT_FALSE(options.node.publish_tf);
+  EXPECT_EQ(options.pipeline.kf_dist_linear, 1.0);
+  EXPECT_EQ(options.pipeline.gate_probability, 0.9);
+  EXPECT_EQ(options.pipeline.matcher.max_iterations, 7);
+  EXPECT_EQ(options.pipeline.max_waiting_scans, 3u);
+  EXPECT_EQ(options.pipeline.method, "sckf_nc");
+}
+
+TEST(Parameters, ANumberThatYamlTakesForATextIsANumber) {
+  EXPECT_EQ(read("odometry_yaw_per_meter: '1e-3'\n").pipeline.odometry_noise.yaw_per_meter, 1e-3);
+}
+
+TEST(Parameters, LeadingSlashesOfFramesAreDropped) {
+  const Options options = read("odom_frame: /odom\nbase_frame: /base_footprint\n");
+  EXPECT_EQ(options.node.odom_frame, "odom");
+  EXPECT_EQ(options.node.base_frame, "base_footprint");
+}
+
+TEST(Parameters, ABadValueIsRefusedByNameValueAndAllowedRange) {
+  EXPECT_TRUE(contains(refusal("gate_probability: 1.5\n"), "gate_probability = 1.5: a number in (0, 1) expected"));
+  EXPECT_TRUE(contains(refusal("gate_probability: .nan\n"), "gate_probability = .nan: a number in (0, 1)"));
+  EXPECT_TRUE(contains(refusal("kf_dist_linear: -0.1\n"), "kf_dist_linear = -0.1: a number of at least 0 m"));
+  EXPECT_TRUE(contains(refusal("kf_dist_linear: .inf\n"), "kf_dist_linear = .inf"));
+  EXPECT_TRUE(contains(refusal("kf_dist_linear: far\n"), "kf_dist_linear = \"far\": a number"));
+  EXPECT_TRUE(contains(refusal("kf_dist_linear: [1, 2]\n"), "kf_dist_linear = [1, 2]: a number"));
+  EXPECT_TRUE(contains(refusal("kf_dist_linear: true\n"), "kf_dist_linear = true: a number"));
+  EXPECT_TRUE(contains(refusal("max_iterations: 2.5\n"), "max_iterations = 2.5: a whole number in [1, 1000]"));
+  EXPECT_TRUE(contains(refusal("max_iterations: 0\n"), "max_iterations = 0: a whole number in [1, 1000]"));
+  EXPECT_TRUE(contains(refusal("publish_tf: 1\n"), "publish_tf = 1: true or false expected"));
+  EXPECT_TRUE(contains(refusal("publish_tf: 'true'\n"), "publish_tf = \"true\": true or false expected"));
+  EXPECT_TRUE(contains(refusal("odom_frame: ''\n"), "odom_frame = \"\": a text that is not empty expected"));
+  EXPECT_TRUE(contains(refusal("odom_frame: 3\n"), "odom_frame = 3: a text"));
+  EXPECT_TRUE(contains(refusal("method: icp\n"), "method = \"icp\": one of \"sckf\""));
+}
+
+TEST(Parameters, EveryBadValueIsNamedAtOnce) {
+  const std::string text = refusal("gate_probability: 2\nmax_iterations: 0\npublish_tf: maybe\n");
+  EXPECT_TRUE(contains(text, "gate_probability"));
+  EXPECT_TRUE(contains(text, "max_iterations"));
+  EXPECT_TRUE(contains(text, "publish_tf"));
+}
+
+TEST(Parameters, ValuesThatContradictEachOtherAreRefused) {
+  EXPECT_TRUE(contains(refusal("range_min: 5.0\nrange_max: 4.0\n"), "range_min = 5: less than range_max = 4 expected"));
+  EXPECT_TRUE(contains(refusal("range_noise_min: 0.2\n"), "range_noise_min = 0.2: less than range_noise_max"));
+  EXPECT_TRUE(
+      contains(refusal("odom_frame: base_link\n"), "odom_frame = \"base_link\": another frame than base_frame"));
+}
+
+TEST(Parameters, UnknownNamesAreToldAndChangeNothing) {
+  std::vector<std::string> unknown;
+  const Options options = read("kf_dist_linaer: 3.0\nscan:\n  range: 1.0\n", &unknown);
+  EXPECT_EQ(unknown, (std::vector<std::string>{"kf_dist_linaer", "scan/range"}));
+  EXPECT_EQ(options.pipeline.kf_dist_linear, PipelineOptions().kf_dist_linear);
+}
+
+TEST(Parameters, AFileThatCannotBeReadIsNamed) {
+  EXPECT_THROW(ParameterFile("/nowhere/parameters.yaml"), std::invalid_argument);
+  EXPECT_TRUE(contains(refusal("- a\n- list\n"), "sckf_parameters.yaml"));
+  EXPECT_TRUE(contains(refusal("odom_frame: [unclosed\n"), "sckf_parameters.yaml"));
+}
+
+}  // namespace
+}  // namespace sckf
