@@ -1,0 +1,58 @@
+// Messages to the package's types and back.
+#pragma once
+
+#include <geometry_msgs/PoseStamped.h>
+#include <geometry_msgs/PoseWithCovarianceStamped.h>
+#include <geometry_msgs/TransformStamped.h>
+#include <nav_msgs/Odometry.h>
+#include <sensor_msgs/LaserScan.h>
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+
+#include "sckf_odometry/pipeline/scan_odometry.h"
+
+namespace sckf {
+
+Stamp toStamp(const ros::Time& time);
+ros::Time toTime(Stamp stamp);
+
+/// The name without the leading slash that old drivers put before it and tf2 refuses.
+std::string frameName(const std::string& frame);
+
+/// The scan as it is: which ranges can be used is decided where it is matched. angle_max is not looked at: beam i is at
+/// angle_min + i · angle_increment by the definition of the message, while drivers disagree about whether angle_max is
+/// the last beam or the one after it, and round it.
+LaserScan toScan(const sensor_msgs::LaserScan& message);
+
+/// x, y and yaw of a pose. Empty, with the problem in words, if a number is not finite or the quaternion is not of unit
+/// length: a driver that never filled it in.
+std::optional<SE2> toPlanar(const geometry_msgs::Pose& pose, std::string* problem);
+std::optional<SE2> toPlanar(const geometry_msgs::Transform& transform, std::string* problem);
+SE2 toPlanar(const Eigen::Isometry3d& transform);
+Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& transform);
+
+/// Pose of the message's child frame, with the covariance of its twist if that is finite. Empty, with the problem in
+/// words, if the pose cannot be used.
+std::optional<OdometrySample> toOdometrySample(const nav_msgs::Odometry& message, std::string* problem);
+
+/// The same for another frame fixed to the robot, odom_from_base = odom_from_child ⊕ child_from_base; the twist
+/// covariance with it.
+OdometrySample moved(const OdometrySample& sample, const SE2& child_from_base);
+
+/// The robot lives in the plane: z, roll, pitch and their rates are zero, and known, so that their variances are this
+/// small value [m², rad², and per s²] and not zero, which other packages cannot invert, nor large, which rviz draws.
+constexpr double kVarianceOutOfPlane = 1e-6;
+
+/// Pose in odom_frame, twist in base_frame.
+nav_msgs::Odometry toOdometryMessage(const Estimate& estimate, const std::string& odom_frame,
+                                     const std::string& base_frame);
+geometry_msgs::PoseWithCovarianceStamped toPoseMessage(const Estimate& estimate, const std::string& odom_frame);
+geometry_msgs::PoseStamped toPoseStamped(const SE2& pose, Stamp stamp, const std::string& frame);
+
+/// The transform that takes coordinates in child_frame to coordinates in frame.
+geometry_msgs::TransformStamped toTransform(const SE2& frame_from_child, Stamp stamp, const std::string& frame,
+                                            const std::string& child_frame);
+
+}  // namespace sckf

@@ -1,0 +1,182 @@
+#include "sckf_odometry/ros/conversions.h"
+
+#include <array>
+#include <cmath>
+#include <sstream>
+
+namespace sckf {
+
+namespace {
+
+// Axes of the 6 × 6 covariances of geometry_msgs, row by row in this order.
+enum Axis : std::size_t { kX, kY, kZ, kRoll, kPitch, kYaw, kAxes };
+constexpr std::array<Axis, 3> kPlane{kX, kY, kYaw};
+
+using MessageCovariance = boost::array<double, kAxes * kAxes>;
+
+constexpr std::size_t index(Axis row, Axis column) { return row * kAxes + column; }
+
+MessageCovariance toMessageCovariance(const Eigen::Matrix3d& planar) {
+  MessageCovariance covariance;
+  covariance.fill(0.0);
+  for (const Axis axis : {kZ, kRoll, kPitch}) covariance[index(axis, axis)] = kVarianceOutOfPlane;
+  for (std::size_t i = 0; i < kPlane.size(); ++i) {
+    for (std::size_t j = 0; j < kPlane.size(); ++j) {
+      covariance[index(kPlane[i], kPlane[j])] = planar(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    }
+  }
+  return covariance;
+}
+
+Eigen::Matrix3d toPlanarCovariance(const MessageCovariance& covariance) {
+  Eigen::Matrix3d planar;
+  for (std::size_t i = 0; i < kPlane.size(); ++i) {
+    for (std::size_t j = 0; j < kPlane.size(); ++j) {
+      planar(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = covariance[index(kPlane[i], kPlane[j])];
+    }
+  }
+  return planar;
+}
+
+geometry_msgs::Quaternion toQuaternion(double yaw) {
+  geometry_msgs::Quaternion quaternion;
+  quaternion.z = std::sin(0.5 * yaw);
+  quaternion.w = std::cos(0.5 * yaw);
+  return quaternion;
+}
+
+geometry_msgs::Pose toPose(const SE2& pose) {
+  geometry_msgs::Pose message;
+  message.position.x = pose.x;
+  message.position.y = pose.y;
+  message.orientation = toQuaternion(pose.yaw);
+  return message;
+}
+
+Eigen::Quaterniond toEigen(const geometry_msgs::Quaternion& q) { return {q.w, q.x, q.y, q.z}; }
+
+std::optional<SE2> planar(double x, double y, const geometry_msgs::Quaternion& orientation, std::string* problem) {
+  constexpr double kTolerance = 0.01;  // of the quaternion's length: rounding, not a field that was never filled in
+  const Eigen::Quaterniond q = toEigen(orientation);
+  std::ostringstream text;
+  if (!std::isfinite(x) || !std::isfinite(y)) {
+    text << "position (" << x << ", " << y << "): finite numbers expected";
+  } else if (!(std::abs(q.norm() - 1.0) <= kTolerance)) {
+    text << "orientation (" << q.x() << ", " << q.y() << ", " << q.z() << ", " << q.w()
+         << "): a quaternion of length 1 expected";
+  } else {
+    return toPlanar(Eigen::Isometry3d(Eigen::Translation3d(x, y, 0.0) * q.normalized()));
+  }
+  if (problem != nullptr) *problem = text.str();
+  return std::nullopt;
+}
+
+}  // namespace
+
+Stamp toStamp(const ros::Time& time) { return Stamp(static_cast<Stamp::rep>(time.toNSec())); }
+
+ros::Time toTime(Stamp stamp) { return ros::Time().fromNSec(static_cast<uint64_t>(stamp.count())); }
+
+std::string frameName(const std::string& frame) {
+  return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
+}
+
+LaserScan toScan(const sensor_msgs::LaserScan& message) {
+  LaserScan scan;
+  scan.stamp = toStamp(message.header.stamp);
+  scan.angle_min = static_cast<double>(message.angle_min);
+  scan.angle_increment = static_cast<double>(message.angle_increment);
+  scan.range_min = static_cast<double>(message.range_min);
+  scan.range_max = static_cast<double>(message.range_max);
+  scan.ranges = message.ranges;
+  return scan;
+}
+
+std::optional<SE2> toPlanar(const geometry_msgs::Pose& pose, std::string* problem) {
+  return planar(pose.position.x, pose.position.y, pose.orientation, problem);
+}
+
+std::optional<SE2> toPlanar(const geometry_msgs::Transform& transform, std::string* problem) {
+  return planar(transform.translation.x, transform.translation.y, transform.rotation, problem);
+}
+
+SE2 toPlanar(const Eigen::Isometry3d& transform) {
+  const Eigen::Vector3d ahead = transform.linear().col(0);
+  return {transform.translation().x(), transform.translation().y(), std::atan2(ahead.y(), ahead.x())};
+}
+
+Eigen::Isometry3d toIsometry(const geometry_msgs::Transform& transform) {
+  const auto& t = transform.translation;
+  return Eigen::Translation3d(t.x, t.y, t.z) * toEigen(transform.rotation).normalized();
+}
+
+std::optional<OdometrySample> toOdometrySample(const nav_msgs::Odometry& message, std::string* problem) {
+  const std::optional<SE2> pose = toPlanar(message.pose.pose, problem);
+  if (!pose) return std::nullopt;
+  OdometrySample sample;
+  sample.stamp = toStamp(message.header.stamp);
+  sample.odom_from_base = *pose;
+  const Eigen::Matrix3d twist_covariance = toPlanarCovariance(message.twist.covariance);
+  if (twist_covariance.allFinite()) sample.twist_covariance = twist_covariance;
+  return sample;
+}
+
+OdometrySample moved(const OdometrySample& sample, const SE2& child_from_base) {
+  OdometrySample result = sample;
+  result.odom_from_base = compose(sample.odom_from_base, child_from_base);
+  if (sample.twist_covariance) {
+    // The velocity of the origin of base, v + ω × p, turned into base.
+    Eigen::Matrix3d J_base_child = Eigen::Matrix3d::Identity();
+    const Eigen::Matrix2d R_child_to_base = child_from_base.rotation().transpose();
+    J_base_child.topLeftCorner<2, 2>() = R_child_to_base;
+    J_base_child.topRightCorner<2, 1>() = R_child_to_base * Eigen::Vector2d(-child_from_base.y, child_from_base.x);
+    result.twist_covariance = J_base_child * *sample.twist_covariance * J_base_child.transpose();
+  }
+  return result;
+}
+
+nav_msgs::Odometry toOdometryMessage(const Estimate& estimate, const std::string& odom_frame,
+                                     const std::string& base_frame) {
+  nav_msgs::Odometry message;
+  message.header.stamp = toTime(estimate.stamp);
+  message.header.frame_id = odom_frame;
+  message.child_frame_id = base_frame;
+  message.pose.pose = toPose(estimate.odom_from_base);
+  message.pose.covariance = toMessageCovariance(estimate.covariance);
+  message.twist.twist.linear.x = estimate.twist.x();
+  message.twist.twist.linear.y = estimate.twist.y();
+  message.twist.twist.angular.z = estimate.twist.z();
+  message.twist.covariance = toMessageCovariance(estimate.twist_covariance);
+  return message;
+}
+
+geometry_msgs::PoseWithCovarianceStamped toPoseMessage(const Estimate& estimate, const std::string& odom_frame) {
+  geometry_msgs::PoseWithCovarianceStamped message;
+  message.header.stamp = toTime(estimate.stamp);
+  message.header.frame_id = odom_frame;
+  message.pose.pose = toPose(estimate.odom_from_base);
+  message.pose.covariance = toMessageCovariance(estimate.covariance);
+  return message;
+}
+
+geometry_msgs::PoseStamped toPoseStamped(const SE2& pose, Stamp stamp, const std::string& frame) {
+  geometry_msgs::PoseStamped message;
+  message.header.stamp = toTime(stamp);
+  message.header.frame_id = frame;
+  message.pose = toPose(pose);
+  return message;
+}
+
+geometry_msgs::TransformStamped toTransform(const SE2& frame_from_child, Stamp stamp, const std::string& frame,
+                                            const std::string& child_frame) {
+  geometry_msgs::TransformStamped message;
+  message.header.stamp = toTime(stamp);
+  message.header.frame_id = frame;
+  message.child_frame_id = child_frame;
+  message.transform.translation.x = frame_from_child.x;
+  message.transform.translation.y = frame_from_child.y;
+  message.transform.rotation = toQuaternion(frame_from_child.yaw);
+  return message;
+}
+
+}  // namespace sckf

@@ -1,0 +1,188 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <limits>
+
+#include "sckf_odometry/ros/conversions.h"
+#include "text_matchers.h"
+
+namespace sckf {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+nav_msgs::Odometry odometryAt(double x, double y, double yaw) {
+  nav_msgs::Odometry message;
+  message.header.stamp = ros::Time(12, 345678901);
+  message.pose.pose.position.x = x;
+  message.pose.pose.position.y = y;
+  message.pose.pose.orientation.z = std::sin(yaw / 2);
+  message.pose.pose.orientation.w = std::cos(yaw / 2);
+  return message;
+}
+
+std::string problemOf(const nav_msgs::Odometry& message) {
+  std::string problem;
+  EXPECT_FALSE(toOdometrySample(message, &problem));
+  return problem;
+}
+
+TEST(Conversions, StampsKeepEveryNanosecond) {
+  const ros::Time time(1438050934, 400468801);
+  EXPECT_EQ(toStamp(time).count(), 1438050934400468801);
+  EXPECT_EQ(toTime(toStamp(time)), time);
+}
+
+TEST(Conversions, FrameNamesLoseTheirLeadingSlash) {
+  EXPECT_EQ(frameName("/camera_depth_frame"), "camera_depth_frame");
+  EXPECT_EQ(frameName("robot1/laser"), "robot1/laser");
+  EXPECT_EQ(frameName(""), "");
+}
+
+TEST(Conversions, AScanKeepsItsBeamsWhateverAngleMaxSays) {
+  sensor_msgs::LaserScan message;
+  message.header.stamp = ros::Time(3, 5);
+  message.angle_min = -0.5F;
+  message.angle_increment = 0.25F;
+  message.angle_max = 99.0F;
+  message.range_min = 0.125F;
+  message.range_max = 30.0F;
+  message.ranges = {1.0F, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()};
+  const LaserScan scan = toScan(message);
+  EXPECT_EQ(scan.stamp, toStamp(message.header.stamp));
+  EXPECT_EQ(scan.angle_min, -0.5);
+  EXPECT_EQ(scan.angle_increment, 0.25);
+  EXPECT_EQ(scan.range_min, 0.125);
+  EXPECT_EQ(scan.range_max, 30.0);
+  ASSERT_EQ(scan.ranges.size(), 3u);
+  EXPECT_TRUE(std::isnan(scan.ranges[1]));
+}
+
+TEST(Conversions, OdometryBecomesASample) {
+  const auto sample = toOdometrySample(odometryAt(1.5, -2.5, -3.0), nullptr);
+  ASSERT_TRUE(sample);
+  EXPECT_EQ(sample->stamp.count(), 12345678901);
+  EXPECT_NEAR(error(sample->odom_from_base, SE2(1.5, -2.5, -3.0)).norm(), 0.0, 1e-12);
+}
+
+TEST(Conversions, TheHeadingOfATiltedPoseIsThatOfItsXAxis) {
+  const Eigen::Quaterniond q = Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()) *
+                               Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY()) *
+                               Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX());
+  nav_msgs::Odometry message = odometryAt(0.0, 0.0, 0.0);
+  message.pose.pose.orientation.x = q.x();
+  message.pose.pose.orientation.y = q.y();
+  message.pose.pose.orientation.z = q.z();
+  message.pose.pose.orientation.w = q.w();
+  EXPECT_NEAR(toOdometrySample(message, nullptr)->odom_from_base.yaw, 0.7, 1e-12);
+}
+
+TEST(Conversions, OdometryThatIsNotAPoseIsRefusedWithItsValue) {
+  nav_msgs::Odometry message = odometryAt(kNaN, 0.0, 0.0);
+  EXPECT_TRUE(contains(problemOf(message), "position (nan, 0): finite numbers expected"));
+  message = odometryAt(0.0, std::numeric_limits<double>::infinity(), 0.0);
+  EXPECT_TRUE(contains(problemOf(message), "position (0, inf)"));
+  message = odometryAt(0.0, 0.0, 0.0);
+  message.pose.pose.orientation.w = 0.0;
+  EXPECT_TRUE(contains(problemOf(message), "orientation (0, 0, 0, 0): a quaternion of length 1 expected"));
+  message.pose.pose.orientation.w = 1.1;
+  EXPECT_TRUE(contains(problemOf(message), "orientation (0, 0, 0, 1.1)"));
+  message.pose.pose.orientation.w = kNaN;
+  EXPECT_TRUE(contains(problemOf(message), "orientation (0, 0, 0, nan)"));
+}
+
+TEST(Conversions, AQuaternionThatIsOnlyRoundedIsTaken) {
+  nav_msgs::Odometry message = odometryAt(0.0, 0.0, 1.0);
+  message.pose.pose.orientation.z *= 1.001;
+  message.pose.pose.orientation.w *= 1.001;
+  EXPECT_NEAR(toOdometrySample(message, nullptr)->odom_from_base.yaw, 1.0, 1e-12);
+}
+
+TEST(Conversions, TheTwistCovarianceIsThatOfTheThreeAxesOfThePlane) {
+  nav_msgs::Odometry message = odometryAt(0.0, 0.0, 0.0);
+  for (std::size_t i = 0; i < 36; ++i) message.twist.covariance[i] = static_cast<double>(i);
+  Eigen::Matrix3d expected;
+  expected << 0, 1, 5, 6, 7, 11, 30, 31, 35;  // rows and columns x, y, yaw of the 6 × 6
+  EXPECT_EQ(*toOdometrySample(message, nullptr)->twist_covariance, expected);
+  message.twist.covariance[7] = kNaN;
+  EXPECT_FALSE(toOdometrySample(message, nullptr)->twist_covariance);
+}
+
+TEST(Conversions, OdometryOfAnotherFrameOfTheRobotIsMoved) {
+  const SE2 child_from_base(-0.3, 0.1, 0.5);
+  OdometrySample sample;
+  sample.odom_from_base = SE2(1.0, 2.0, 0.7);
+  sample.twist_covariance = Eigen::Vector3d(0.01, 0.02, 0.03).asDiagonal().toDenseMatrix();
+  const OdometrySample result = moved(sample, child_from_base);
+  EXPECT_NEAR(error(result.odom_from_base, compose(sample.odom_from_base, child_from_base)).norm(), 0.0, 1e-12);
+
+  // The twist of base by that of child, differentiated: the motions of both over a short time.
+  const double dt = 1e-6;
+  Eigen::Matrix3d J_base_child;
+  for (int i = 0; i < 3; ++i) {
+    const SE2 child_motion(Eigen::Vector3d(dt * Eigen::Vector3d::Unit(i)));
+    const SE2 base_motion = compose(inverse(child_from_base), compose(child_motion, child_from_base));
+    J_base_child.col(i) = base_motion.vector() / dt;
+  }
+  const Eigen::Matrix3d expected = J_base_child * *sample.twist_covariance * J_base_child.transpose();
+  EXPECT_LT((*result.twist_covariance - expected).norm(), 1e-6);
+}
+
+TEST(Conversions, AnEstimateBecomesOdometryWithItsWholeCovariance) {
+  Estimate estimate;
+  estimate.stamp = Stamp(7000000001);
+  estimate.odom_from_base = SE2(1.0, 2.0, 2.5);
+  estimate.covariance << 4, 1, 0.5, 1, 3, 0.2, 0.5, 0.2, 2;
+  estimate.twist = {0.5, -0.1, 0.3};
+  estimate.twist_covariance = Eigen::Vector3d(0.1, 0.2, 0.3).asDiagonal();
+  const nav_msgs::Odometry message = toOdometryMessage(estimate, "odom", "base_link");
+  EXPECT_EQ(message.header.frame_id, "odom");
+  EXPECT_EQ(message.child_frame_id, "base_link");
+  EXPECT_EQ(message.header.stamp, ros::Time(7, 1));
+  EXPECT_EQ(message.twist.twist.linear.x, 0.5);
+  EXPECT_EQ(message.twist.twist.linear.y, -0.1);
+  EXPECT_EQ(message.twist.twist.angular.z, 0.3);
+
+  using Covariance = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+  const Covariance covariance = Eigen::Map<const Covariance>(message.pose.covariance.data());
+  const auto x = 0, y = 1, yaw = 5;
+  EXPECT_EQ(covariance(x, x), 4.0);
+  EXPECT_EQ(covariance(x, y), 1.0);
+  EXPECT_EQ(covariance(x, yaw), 0.5);
+  EXPECT_EQ(covariance(y, yaw), 0.2);
+  EXPECT_EQ(covariance(yaw, yaw), 2.0);
+  EXPECT_EQ(covariance(2, 2), kVarianceOutOfPlane);
+  EXPECT_EQ(covariance, covariance.transpose());
+  EXPECT_GT(Eigen::SelfAdjointEigenSolver<Covariance>(covariance).eigenvalues().minCoeff(), 0.0);
+
+  const auto back = toOdometrySample(message, nullptr);
+  ASSERT_TRUE(back);
+  EXPECT_NEAR(error(back->odom_from_base, estimate.odom_from_base).norm(), 0.0, 1e-12);
+  EXPECT_EQ(*back->twist_covariance, estimate.twist_covariance);
+}
+
+TEST(Conversions, TransformsAndPosesSayTheSame) {
+  Estimate estimate;
+  estimate.stamp = Stamp(1500000000);
+  estimate.odom_from_base = SE2(-1.0, 4.0, -2.0);
+  const auto transform = toTransform(estimate.odom_from_base, estimate.stamp, "odom", "base_link");
+  EXPECT_EQ(transform.header.frame_id, "odom");
+  EXPECT_EQ(transform.child_frame_id, "base_link");
+  EXPECT_NEAR(error(*toPlanar(transform.transform, nullptr), estimate.odom_from_base).norm(), 0.0, 1e-12);
+  const auto pose = toPoseMessage(estimate, "odom");
+  EXPECT_EQ(pose.header.stamp, transform.header.stamp);
+  EXPECT_NEAR(error(*toPlanar(pose.pose.pose, nullptr), estimate.odom_from_base).norm(), 0.0, 1e-12);
+}
+
+TEST(Conversions, AnUpsideDownMountKeepsItsThirdDimension) {
+  geometry_msgs::Transform transform;
+  transform.translation.x = 0.2;
+  transform.translation.z = 0.4;
+  transform.rotation.x = 1.0;  // half a turn about x
+  const Eigen::Isometry3d base_from_laser = toIsometry(transform);
+  EXPECT_LT((base_from_laser * Eigen::Vector3d(1.0, 2.0, 0.0) - Eigen::Vector3d(1.2, -2.0, 0.4)).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace sckf
