@@ -1,0 +1,55 @@
+// All that the node publishes of the estimate.
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+#include <tf2_ros/transform_broadcaster.h>
+
+#include <optional>
+
+#include "sckf_odometry/ros/parameters.h"
+#include "sckf_odometry/ros/recorders.h"
+
+namespace sckf {
+
+class EstimatePublisher {
+ public:
+  EstimatePublisher(ros::NodeHandle nh, const NodeOptions& options);
+
+  /// odometry/filtered and TF, unless something as new has been published: each stamp once, in increasing order.
+  void publish(const Estimate& estimate);
+
+  /// pose, at the scan's own stamp, even if the wheels have carried the estimate further already. Its trajectory and
+  /// points go to what publishViews() shows.
+  void publishScan(const ScanReport& report);
+
+  /// The wheels alone, drawn from where the estimate began.
+  void addWheels(const OdometrySample& sample);
+
+  /// path, path_odometry and cloud, if there is anything new.
+  void publishViews();
+
+  /// A new estimate begins, at whatever time.
+  void restart();
+
+ private:
+  void publishTransform(const Estimate& estimate);
+
+  NodeOptions options_;
+  ros::Publisher odometry_;
+  ros::Publisher pose_;
+  ros::Publisher path_;
+  ros::Publisher path_odometry_;
+  ros::Publisher cloud_;
+  tf2_ros::TransformBroadcaster broadcaster_;
+
+  std::optional<Estimate> last_published_;
+  std::optional<SE2> odom_from_wheels_;  // where the frame of the driver's odometry is in odom
+  PathRecorder path_recorder_;
+  PathRecorder wheels_recorder_;
+  CloudRecorder cloud_recorder_;
+  Stamp cloud_stamp_{0};
+  bool views_changed_ = false;
+};
+
+}  // namespace sckf

@@ -1,0 +1,30 @@
+// Warnings that say everything once and do not flood the log.
+#pragma once
+
+#include <ros/console.h>
+#include <ros/time.h>
+
+#include <map>
+#include <string>
+
+namespace sckf {
+
+/// Each kind of warning is written at most once in a period of wall time, however fast a bag is replayed.
+class Warnings {
+ public:
+  explicit Warnings(double period = 5.0) : period_(period) {}
+
+  void warn(const std::string& kind, const std::string& text) {
+    const ros::SteadyTime now = ros::SteadyTime::now();
+    const auto last = last_.find(kind);
+    if (last != last_.end() && (now - last->second).toSec() < period_) return;
+    last_[kind] = now;
+    ROS_WARN_STREAM_NAMED("sckf_odometry", text);
+  }
+
+ private:
+  double period_;  // [s]
+  std::map<std::string, ros::SteadyTime> last_;
+};
+
+}  // namespace sckf
