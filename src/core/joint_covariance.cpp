@@ -20,6 +20,14 @@ Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 9> projectedJacobian
   return H;
 }
 
+/// U: a correction δ of the position lengthens the lever over which the clone's yaw error moves the pose: 𝒥 δ φ̃_k.
+Eigen::Matrix3d leverCorrection(const Innovation& innovation) {
+  const Eigen::Vector3d correction = innovation.gain * innovation.residual;
+  Eigen::Matrix3d U = Eigen::Matrix3d::Zero();
+  U.topRightCorner<2, 1>() << -correction.y(), correction.x();
+  return U;
+}
+
 }  // namespace
 
 double Innovation::nis() const { return residual.dot(covariance.llt().solve(residual)); }
@@ -61,8 +69,10 @@ void JointCovariance::weigh(const Eigen::MatrixXd& J_reference, Innovation& inno
 void JointCovariance::update(const Eigen::MatrixXd& J_reference, const Innovation& innovation) {
   const auto& K = innovation.gain;
   const Projected P = project(J_reference);
-  // The pose's rows of I − K̄ H̄, where K̄ is K with zero rows for clone and ranges.
+  const Eigen::Matrix3d U = leverCorrection(innovation);
+  // The pose's rows of I − K̄ H̄ + Ū, where K̄ is K with zero rows for clone and ranges.
   Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 9> A = -K * projectedJacobian(innovation);
+  A.leftCols<3>() += U;
   A.middleCols<3>(3) += Eigen::Matrix3d::Identity();
 
   // B_z = E{z̃_k rᵀ}, M × d: how the innovation correlates with each range.
@@ -71,7 +81,7 @@ void JointCovariance::update(const Eigen::MatrixXd& J_reference, const Innovatio
                               R_k_.asDiagonal() * J_reference.transpose();
   P_XX_ = symmetric<Eigen::Matrix3d>(A * P * A.transpose() + K * innovation.noise * K.transpose());  // (23)
   P_kX_ = P.topRows<3>() * A.transpose();
-  Pi_ = Phi_ * Pi_ - K * B_z.transpose();
+  Pi_ = (Phi_ * Pi_ + U * P_kz_ - K * B_z.transpose()).eval();
   Phi_.setIdentity();
 }
 

@@ -57,6 +57,11 @@ class JointCovariance {
 
   /// Schmidt update: the pose is corrected with the innovation's gain; clone and range noise are considered but not
   /// corrected, so that P_kk, P_kz and R_k stay (22)(23). Joseph form.
+  ///
+  /// Beyond the paper: X̃ ← (I − K̄ H̄) X̆ + U X̃_k, where U X̃_k = [𝒥 δ φ̃_k; 0] and δ is the correction of the position.
+  /// It is of second order, but it keeps the clone's own error out of H_k X̃_k + H X̃ at the next displacement to the
+  /// same clone: a displacement tells nothing about where its reference is. Without it every correction is taken for a
+  /// compass: with references kept for ten scans, a yaw known to 0.3 rad is soon believed to be known to 0.05 rad.
   void update(const Eigen::MatrixXd& J_reference, const Innovation& innovation);
 
   /// A new clone of the pose (24)-(27). pose_with_ranges (3 × M): P_Xz of the scan that belongs to it, zero if the

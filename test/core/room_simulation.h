@@ -1,0 +1,55 @@
+// A robot with wheels and a laser between straight walls, with every error drawn from the noise that the filter is
+// told.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "random_inputs.h"
+#include "sckf_odometry/core/displacement.h"
+#include "sckf_odometry/core/se2.h"
+
+namespace sckf {
+
+/// The line normalᵀ p = distance in odom; the robot is on the side of the origin.
+struct Wall {
+  Eigen::Vector2d normal;
+  double distance;
+};
+
+/// One scan: where its beams really ended, and the range noise z̃ that all displacements made with it share.
+struct SimulatedScan {
+  SE2 odom_from_base;
+  std::vector<int> wall;                // per beam, −1 if it met nothing
+  std::vector<Eigen::Vector2d> points;  // per beam, in base_link
+  Eigen::VectorXd noise;                // z̃ [m]
+  Eigen::VectorXd variance;             // diagonal of R [m²]
+};
+
+class RoomSimulation {
+ public:
+  static constexpr int kBeams = 60;
+  static constexpr double kMaxRange = 20.0;  // [m]
+
+  RoomSimulation(std::vector<Wall> walls, double range_std) : walls_(std::move(walls)), range_std_(range_std) {}
+
+  SimulatedScan scan(const SE2& odom_from_base, RandomInputs& random) const;
+
+  /// The displacement that least squares of e_i = nᵢᵀ (R pᵢ + t − qᵢ) finds, to first order in the noise: pᵢ a point of
+  /// the current scan, qᵢ the nearest point of the reference on the same wall. Directions that the walls leave open
+  /// are not observable, and what the displacement says about them is made up.
+  Displacement match(const SimulatedScan& reference, const SimulatedScan& current, RandomInputs& random) const;
+
+ private:
+  struct Problem {
+    Eigen::MatrixXd A;             // ∂e/∂displacement, pairs × 3
+    Eigen::MatrixXd by_reference;  // ∂e/∂z_k, pairs × beams
+    Eigen::MatrixXd by_current;    // ∂e/∂z_{k+m}, pairs × beams
+  };
+  Problem problem(const SimulatedScan& reference, const SimulatedScan& current) const;
+
+  std::vector<Wall> walls_;
+  double range_std_;
+};
+
+}  // namespace sckf
