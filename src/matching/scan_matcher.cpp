@@ -1,36 +1,119 @@
 #include "sckf_odometry/matching/scan_matcher.h"
 
+#include <mrpt/poses/CPose2D.h>
 #include <mrpt/poses/CPosePDF.h>
 #include <mrpt/slam/CICP.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-
-#include "sckf_odometry/matching/point_to_line.h"
 
 namespace sckf {
 
 namespace {
 
-/// Points of the current scan with their nearest neighbours of the reference, at a displacement.
-std::vector<Pair> nearestPairs(const PreparedScan& reference, const PreparedScan& current, const SE2& displacement,
-                               double max_distance) {
-  mrpt::maps::TMatchingParams params;
-  params.maxDistForCorrespondence = static_cast<float>(max_distance);
-  params.maxAngularDistForCorrespondence = 0.0F;
-  params.onlyKeepTheClosest = true;
-  mrpt::tfest::TMatchingPairList list;
-  mrpt::maps::TMatchingExtraResults extra;
-  reference.map.determineMatching2D(&current.map, {displacement.x, displacement.y, displacement.yaw}, list, params,
-                                    extra);
-  std::vector<Pair> pairs;
-  pairs.reserve(list.size());
-  for (const auto& pair : list) {
-    pairs.push_back({static_cast<int>(pair.globalIdx), static_cast<int>(pair.localIdx)});
+/// Where the search for the displacement has come to.
+struct Alignment {
+  SE2 reference_from_current;
+  double cost = 0.0;      // of the points and of the prior: smaller is better
+  double surprise = 0.0;  // squared Mahalanobis distance from the prior
+  AlignmentProblem problem;
+};
+
+/// The search for one displacement: scans, prior and options of a call of match().
+class Search {
+ public:
+  Search(const PreparedScan& reference, const PreparedScan& current, const DisplacementPrediction& prediction,
+         const MatcherOptions& options)
+      : reference_(reference),
+        current_(current),
+        mean_(prediction.reference_from_current),
+        prior_information_((prediction.covariance + priorFloor(options)).inverse()),
+        options_(options) {}
+
+  /// From the predicted displacement; from other yaws too if the scans do not fall together there.
+  std::optional<Alignment> run() const {
+    std::optional<Alignment> best = align(mean_);
+    if (best && !suspicious(*best)) return best;
+    for (int k = 1; k <= options_.search_yaw_steps; ++k) {
+      for (const double side : {-1.0, 1.0}) {
+        std::optional<Alignment> other = align({mean_.x, mean_.y, mean_.yaw + side * k * options_.search_yaw_step});
+        if (other && (!best || other->cost < best->cost)) best.emplace(std::move(*other));
+      }
+    }
+    return best;
   }
-  return pairs;
+
+ private:
+  static Eigen::Matrix3d priorFloor(const MatcherOptions& options) {
+    return Eigen::Vector3d(options.prior_std_translation, options.prior_std_translation, options.prior_std_yaw)
+        .cwiseAbs2()
+        .asDiagonal();
+  }
+
+  SE2 icp(const SE2& start) const {
+    mrpt::slam::CICP icp;
+    icp.options.corresponding_points_decimation = 1;
+    icp.options.onlyUniqueRobust = true;
+    icp.options.skip_cov_calculation = true;
+    icp.options.skip_quality_calculation = true;
+    icp.options.thresholdDist = options_.icp_pair_distance;
+    icp.options.smallestThresholdDist = options_.pairs.max_distance;
+    mrpt::slam::CICP::TReturnInfo info;
+    const mrpt::poses::CPose2D guess(start.x, start.y, start.yaw);
+    const auto mean = icp.Align(&reference_.map, &current_.map, guess, info)->getMeanVal();
+    return {mean.x(), mean.y(), mean.phi()};
+  }
+
+  /// CICP, then the maximum of the posterior of surfaces and prior: the prior decides which points belong together in
+  /// directions that the scans hardly see, where CICP slides. Empty with too few pairs.
+  std::optional<Alignment> align(const SE2& start) const {
+    constexpr double kSettled = 1e-4;  // [m, rad]
+    SE2 x = icp(start);
+    double distance = options_.icp_pair_distance;
+    for (int i = 0; i < options_.max_iterations; ++i) {
+      const AlignmentProblem problem(reference_, current_, x, distance, options_.pairs);
+      if (tooFew(problem)) return std::nullopt;
+      const auto equations = problem.normalEquations(x);
+      const Eigen::Matrix3d information = equations.information + prior_information_;
+      const Eigen::Vector3d gradient = equations.gradient + prior_information_ * error(x, mean_);
+      const Eigen::Vector3d step = -information.ldlt().solve(gradient);
+      x = corrected(x, step);
+      const bool settled = step.cwiseAbs().maxCoeff() < kSettled;
+      if (settled && distance <= options_.pairs.max_distance) break;
+      distance = std::max(options_.pairs.max_distance, 0.6 * distance);
+    }
+    AlignmentProblem problem(reference_, current_, x, options_.pairs.max_distance, options_.pairs);
+    if (tooFew(problem)) return std::nullopt;
+    const Eigen::Vector3d e = error(x, mean_);
+    const double surprise = e.dot(prior_information_ * e);
+    const double cost = problem.cost(x) + 0.5 * surprise;
+    return Alignment{x, cost, surprise, std::move(problem)};
+  }
+
+  bool tooFew(const AlignmentProblem& problem) const {
+    return problem.pairs().size() < static_cast<std::size_t>(options_.min_pairs);
+  }
+
+  bool suspicious(const Alignment& alignment) const {
+    constexpr double kRough = 2.0;      // residuals of twice what noise explains
+    constexpr double kSurprise = 16.0;  // four sigma from the prior
+    return alignment.problem.overlap() < options_.search_below_overlap || alignment.problem.scale() > kRough ||
+           alignment.surprise > kSurprise;
+  }
+
+  const PreparedScan& reference_;
+  const PreparedScan& current_;
+  SE2 mean_;
+  Eigen::Matrix3d prior_information_;
+  const MatcherOptions& options_;
+};
+
+Match failed(MatchFailure failure) {
+  Match match;
+  match.failure = failure;
+  return match;
 }
 
 }  // namespace
@@ -51,70 +134,28 @@ std::string toString(MatchFailure failure) {
   return "unknown";
 }
 
-ScanMatcher::ScanMatcher(const MatcherOptions& options) : options_(options) {}
-
 Match ScanMatcher::match(const PreparedScan& reference, const PreparedScan& current,
                          const DisplacementPrediction& prediction) const {
-  Match match;
-  // MAP alignment: the prediction helps to decide which points belong together.
-  Eigen::Matrix3d P = prediction.covariance;
-  P.diagonal() +=
-      Eigen::Vector3d(options_.prior_floor_translation, options_.prior_floor_translation, options_.prior_floor_yaw)
-          .cwiseAbs2();
-  const Eigen::Matrix3d prior = P.inverse();
-  SE2 x = prediction.reference_from_current;
+  const std::optional<Alignment> aligned = Search(reference, current, prediction, options_).run();
+  if (!aligned) return failed(MatchFailure::kTooFewPairs);
 
-  if (options_.use_icp) {
-    mrpt::slam::CICP icp;
-    icp.options.maxIterations = 40;
-    icp.options.corresponding_points_decimation = 1;
-    icp.options.onlyUniqueRobust = true;
-    icp.options.skip_cov_calculation = true;
-    icp.options.skip_quality_calculation = true;
-    icp.options.thresholdDist = options_.pair_distance_start;
-    icp.options.smallestThresholdDist = options_.pair_distance;
-    mrpt::poses::CPose2D guess(x.x, x.y, x.yaw);
-    mrpt::slam::CICP::TReturnInfo info;
-    const auto pdf = icp.Align(&reference.map, &current.map, guess, info);
-    const auto mean = pdf->getMeanVal();
-    x = SE2(mean.x(), mean.y(), mean.phi());
-  }
-  double distance = options_.use_icp ? options_.pair_distance * 2 : options_.pair_distance_start;
-  PointToLine problem(reference, current);
-  bool settled = false;
-  for (int i = 0; i < options_.max_iterations; ++i) {
-    problem.setPairs(nearestPairs(reference, current, x, distance), x, options_);
-    if (problem.pairs().size() < static_cast<std::size_t>(options_.min_pairs)) {
-      match.failure = MatchFailure::kTooFewPairs;
-      return match;
-    }
-    const SE2 next = problem.step(x, &prior, prediction.reference_from_current);
-    const Eigen::Vector3d change = error(next, x);
-    x = next;
-    const bool small = change.head<2>().norm() < 1e-4 && std::abs(change.z()) < 1e-4;
-    if (small && distance <= options_.pair_distance) {
-      settled = true;
-      break;
-    }
-    if (small || i > 3) distance = std::max(options_.pair_distance, 0.6 * distance);
-  }
-  match.pairs = problem.pairs();
-  match.overlap = static_cast<double>(match.pairs.size()) / static_cast<double>(current.size());
-  (void)settled;
+  Match match;
+  match.pairs = aligned->problem.pairs();
+  match.overlap = aligned->problem.overlap();
+  const auto estimate = estimateDisplacement(aligned->problem, aligned->reference_from_current, options_.estimation);
   if (match.overlap < options_.min_overlap) {
     match.failure = MatchFailure::kNoOverlap;
-    return match;
-  }
-  match.displacement = problem.solve(x, options_);
-  match.residual_rms = problem.residualRms();
-  if (!match.displacement) {
+  } else if (!estimate) {
     match.failure = MatchFailure::kNotObservable;
-    return match;
-  }
-  const Eigen::Vector3d moved = error(match.displacement->reference_from_current, x);
-  if (moved.head<2>().norm() > options_.max_refinement || std::abs(moved.z()) > options_.max_refinement) {
-    match.displacement.reset();
-    match.failure = MatchFailure::kDiverged;
+  } else {
+    const Eigen::Vector3d moved = error(estimate->displacement.reference_from_current, aligned->reference_from_current);
+    const bool settled = moved.allFinite() && moved.cwiseAbs().maxCoeff() <= options_.max_refinement;
+    match.residual_rms = estimate->residual_rms;
+    if (settled) {
+      match.displacement = estimate->displacement;
+    } else {
+      match.failure = MatchFailure::kDiverged;
+    }
   }
   return match;
 }

@@ -50,7 +50,7 @@ std::vector<ScanReport> ScanOdometry::process() {
 ScanReport ScanOdometry::processScan(const WaitingScan& waiting) {
   ScanReport report;
   report.estimate.stamp = waiting.scan.stamp;
-  ScanRejection rejection;
+  std::string rejection;
   if (!odometry_.covers(waiting.scan.stamp)) {
     report.outcome = ScanOutcome::kNoOdometry;
     return report;
@@ -71,7 +71,7 @@ ScanReport ScanOdometry::processScan(const WaitingScan& waiting) {
   report.estimate.covariance = filter_->covariance();
   if (!scan) {
     report.outcome = ScanOutcome::kUnusable;
-    report.reason = rejection.reason;
+    report.reason = rejection;
     return report;
   }
   if (!reference_) {
@@ -104,10 +104,14 @@ ScanReport ScanOdometry::processScan(const WaitingScan& waiting) {
     if (report.outcome != ScanOutcome::kGated) filter_->update(z, *report.innovation);
   }
   const SE2 moved = filter_->predictedDisplacement().reference_from_current;
-  if (!report.match.displacement || moved.translation().norm() > options_.kf_dist_linear ||
-      std::abs(moved.yaw) > options_.kf_dist_angular || report.match.overlap < options_.kf_min_overlap) {
+  const double way = moved.translation().norm() + (moved.translation() - last_.translation()).norm();
+  const double turn = std::abs(moved.yaw) + std::abs(wrapAngle(moved.yaw - last_.yaw));
+  last_ = moved;
+  if (!report.match.displacement || way > options_.kf_dist_linear || turn > options_.kf_dist_angular ||
+      report.match.overlap < options_.kf_min_overlap) {
     filter_->clone(scan->rangeVariances());
     reference_ = scan;
+    last_ = SE2();
     report.new_reference = true;
   }
   report.estimate.odom_from_base = filter_->pose();

@@ -8,10 +8,10 @@ namespace sckf {
 /// Noise of wheel odometry that grows with the way and with the rotation, like a random walk: the variance of a motion
 /// is the sum of the variances of its parts, however finely odometry is sampled. Ranges: all finite and ≥ 0.
 struct OdometryNoise {
-  double translation_per_meter = 0.05;   ///< std of x and y after 1 m of way [m/√m]
-  double translation_per_radian = 0.02;  ///< std of x and y after 1 rad of rotation [m/√rad]
-  double yaw_per_meter = 0.05;           ///< std of yaw after 1 m of way [rad/√m]
-  double yaw_per_radian = 0.10;          ///< std of yaw after 1 rad of rotation [rad/√rad]
+  double translation_per_meter = 0.10;   ///< std of x and y after 1 m of way [m/√m]
+  double translation_per_radian = 0.08;  ///< std of x and y after 1 rad of rotation [m/√rad]
+  double yaw_per_meter = 0.10;           ///< std of yaw after 1 m of way [rad/√m]
+  double yaw_per_radian = 0.15;          ///< std of yaw after 1 rad of rotation [rad/√rad]
 };
 
 /// The increment with the covariance that the model gives it, 3 × 3 in base_link before the motion.

@@ -4,62 +4,55 @@
 
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "sckf_odometry/core/fusion_method.h"
+#include "sckf_odometry/matching/alignment_problem.h"
+#include "sckf_odometry/matching/displacement_estimation.h"
 #include "sckf_odometry/matching/prepared_scan.h"
 
 namespace sckf {
 
+/// How the displacement is searched for.
 struct MatcherOptions {
-  bool use_icp = false;
-  int max_iterations = 30;
-  double prior_floor_translation = 0.05;
-  double prior_floor_yaw = 0.05;
-  double pair_distance_start = 0.5;
-  double pair_distance = 0.15;
-  int min_pairs = 20;
-  double min_overlap = 0.2;
-  double min_normal_cosine = 0.5;
-  double surface_roughness = 0.01;
-  double huber = 2.0;
-  double max_std = 0.2;
-  double min_information_ratio = 5.0;
-  double max_refinement = 0.5;
-  double matching_noise_scale = 1.0;
+  double icp_pair_distance = 0.5;       ///< [m] CICP pairs points up to this distance at its start
+  int max_iterations = 15;              ///< of the alignment after CICP
+  double prior_std_translation = 0.05;  ///< [m] added to the prediction's std of x and y, for the pairing of points
+  double prior_std_yaw = 0.05;          ///< [rad] … and to its std of yaw
+  double search_below_overlap = 0.6;    ///< more start yaws are tried if a smaller share of the points has a partner
+  double search_yaw_step = 0.12;        ///< [rad] between the start yaws
+  int search_yaw_steps = 2;             ///< start yaws to either side of the prediction
+  int min_pairs = 20;                   ///< fewer points with a partner are "too few pairs"
+  double min_overlap = 0.2;             ///< a smaller share of the points with a partner is "no overlap"
+  double max_refinement = 0.5;  ///< [m, rad] a larger correction of the aligned pose by the estimate is "diverged"
+  PairOptions pairs;
+  EstimationOptions estimation;
 };
 
 enum class MatchFailure {
   kNone,
   kTooFewPairs,    ///< hardly any point of one scan has a partner in the other
   kNoOverlap,      ///< too small a share of the points has a partner
-  kDiverged,       ///< the solution left the region that the prediction allows, or did not settle
+  kDiverged,       ///< the estimate ran away from the aligned pose
   kNotObservable,  ///< the scans see no direction of the displacement
 };
 
 /// "too few pairs", "no overlap", …: for messages and tables.
 std::string toString(MatchFailure failure);
 
-/// A point of the current scan and the point of the reference scan whose surface it lies on.
-struct Pair {
-  int reference = 0;
-  int current = 0;
-};
-
 struct Match {
   std::optional<Displacement> displacement;  ///< empty if and only if failure is not kNone
   MatchFailure failure = MatchFailure::kNone;
-  std::vector<Pair> pairs;    ///< at the solution
+  std::vector<Pair> pairs;    ///< at the aligned pose
   double overlap = 0.0;       ///< share of the points of the current scan that have a partner, 0 to 1
-  double residual_rms = 0.0;  ///< of the weighted residuals: 1 where noise explains them
+  double residual_rms = 0.0;  ///< of the weighted residuals: 1 where the noise explains them
 };
 
 class ScanMatcher {
  public:
-  explicit ScanMatcher(const MatcherOptions& options);
+  explicit ScanMatcher(const MatcherOptions& options) : options_(options) {}
 
   /// The displacement of base_link from the reference scan to the current one. The prediction guides the search and
-  /// decides which points belong together; it does not enter the displacement itself where the scans see.
+  /// the pairing of points; into the displacement itself it enters only in directions that the scans do not see.
   Match match(const PreparedScan& reference, const PreparedScan& current,
               const DisplacementPrediction& prediction) const;
 

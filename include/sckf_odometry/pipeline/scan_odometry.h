@@ -22,8 +22,8 @@ struct PipelineOptions {
   bool prefer_twist_covariance = false;  ///< use the twist covariance of the odometry message where it is sensible
   ScanOptions scan;
   MatcherOptions matcher;
-  double kf_dist_linear = 0.10;     ///< [m] a new reference scan after this way from the last
-  double kf_dist_angular = 0.17;    ///< [rad] … or this rotation
+  double kf_dist_linear = 1.0;     ///< [m] a new reference scan after this way from the last
+  double kf_dist_angular = 0.7;    ///< [rad] … or this rotation
   double kf_min_overlap = 0.6;      ///< … or when a smaller share of the points overlaps
   double gate_probability = 0.999;  ///< χ² gate: an innovation less likely than 1 − this is refused
   bool slip = true;
@@ -94,6 +94,7 @@ class ScanOdometry {
   std::deque<WaitingScan> waiting_;
   std::unique_ptr<FusionMethod> filter_;
   Stamp filter_stamp_{0};
+  SE2 last_;
   std::shared_ptr<const PreparedScan> reference_;
 };
 

@@ -1,0 +1,103 @@
+// The weighted least squares problem that pairs of points of two scans pose.
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <vector>
+
+#include "sckf_odometry/core/se2.h"
+#include "sckf_odometry/matching/prepared_scan.h"
+
+namespace sckf {
+
+/// Which points belong together, and how well each pair is known.
+struct PairOptions {
+  double max_distance = 0.2;        ///< [m] two points farther apart are no pair
+  double max_normal_angle = 1.05;   ///< [rad] nor are points on surfaces that are turned more against each other
+  double surface_roughness = 0.01;  ///< [m] std of a surface about the straight line fitted to it
+  double point_std = 0.02;          ///< [m] std of a point on no straight surface, beside range noise and point spacing
+  double robust_width = 3.0;        ///< a residual of this many std weighs half (Cauchy)
+};
+
+/// A point of the current scan and its nearest point of the reference scan: indices of points, not of beams.
+struct Pair {
+  int reference = 0;
+  int current = 0;
+};
+
+/// Cauchy's robust loss ρ(e) = c²/2 log(1 + e²/c²) of a residual in units of its std.
+struct RobustKernel {
+  double c = 3.0;
+
+  double loss(double e) const { return 0.5 * c * c * std::log1p(e * e / (c * c)); }
+  double weight(double e) const { return 1.0 / (1.0 + e * e / (c * c)); }  ///< ρ′(e) / e
+  double influence(double e) const { return e * weight(e); }               ///< ρ′(e)
+  double slope(double e) const {                                           ///< ρ″(e)
+    const double w = weight(e);
+    return (1.0 - e * e / (c * c)) * w * w;
+  }
+};
+
+/// e = nᵀ(C(φ) p + t − a) / σ: how far the current point p lies from the line through a with normal n of the reference
+/// scan. A pair on a straight surface has one residual, across it; a pair on single points has two, along and across.
+struct Residual {
+  int reference = 0;
+  int current = 0;
+  Eigen::Vector2d normal;            ///< n
+  Eigen::Vector2d anchor;            ///< a: centroid of the surface, or the point itself
+  const Surface* surface = nullptr;  ///< null for single points
+  double std = 1.0;                  ///< σ [m]
+};
+
+/// Everything that one residual has to tell at a displacement.
+struct ResidualTerms {
+  double e;                ///< the residual, in units of its std
+  Eigen::Vector2d lever;   ///< C(φ) p
+  Eigen::Vector2d offset;  ///< C(φ) p + t − a
+  Eigen::Vector3d A;       ///< ∂e/∂(x, y, yaw)
+};
+
+class AlignmentProblem {
+ public:
+  /// Pairs the points at the displacement, at most max_distance [m] apart, and weighs the pairs. Both scans must
+  /// outlive the problem.
+  AlignmentProblem(const PreparedScan& reference, const PreparedScan& current, const SE2& reference_from_current,
+                   double max_distance, const PairOptions& options);
+
+  const PreparedScan& reference() const { return reference_; }
+  const PreparedScan& current() const { return current_; }
+  const std::vector<Pair>& pairs() const { return pairs_; }
+  const std::vector<Residual>& residuals() const { return residuals_; }
+  const RobustKernel& kernel() const { return kernel_; }
+
+  /// Robust std of the residuals, at least 1 and at most a bound: above 1 where the scans differ by more than noise.
+  double scale() const { return scale_; }
+
+  /// Share of the points of the current scan that have a partner.
+  double overlap() const;
+
+  ResidualTerms terms(const Residual& residual, const SE2& reference_from_current) const;
+
+  struct NormalEquations {
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< Σ Aᵀ w A
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();     ///< Σ Aᵀ w e
+  };
+  NormalEquations normalEquations(const SE2& reference_from_current) const;
+
+  /// Loss of the whole current scan, a point without a partner at a fixed price: compares alignments with each other.
+  double cost(const SE2& reference_from_current) const;
+
+ private:
+  void addSurfacePair(const Pair& pair, const SE2& reference_from_current, const PairOptions& options);
+  void addPointPair(const Pair& pair, const PairOptions& options);
+  void fitKernel(const SE2& reference_from_current, const PairOptions& options);
+
+  const PreparedScan& reference_;
+  const PreparedScan& current_;
+  std::vector<Pair> pairs_;
+  std::vector<Residual> residuals_;
+  RobustKernel kernel_;
+  double scale_ = 1.0;
+};
+
+}  // namespace sckf

@@ -1,0 +1,32 @@
+// From aligned scans to a displacement with everything that the filter has to know about its error.
+#pragma once
+
+#include <optional>
+
+#include "sckf_odometry/core/displacement.h"
+#include "sckf_odometry/matching/alignment_problem.h"
+
+namespace sckf {
+
+struct EstimationOptions {
+  double max_std = 0.2;                ///< [m] a direction that the scans tell worse is unobserved
+  double min_information_ratio = 5.0;  ///< … as is one whose information is less than this many times the spurious one
+  int correlated_beams = 10;           ///< residuals of this many neighbouring beams may err together
+};
+
+struct DisplacementEstimate {
+  Displacement displacement;
+  double residual_rms = 0.0;  ///< of the weighted residuals: 1 where the noise explains them
+};
+
+/// The displacement that solves the problem with its pairs and weights as they are, starting from where the pairs were
+/// found; empty if no direction of it is observable. Directions that are not observable keep the start's value.
+///
+/// With loss Σ ρ(e_i(x, z)), implicit differentiation of its gradient at the minimum gives (method of Censi, ICRA 2007)
+///   J = ∂x/∂z = −(∂²L/∂x²)⁻¹ ∂²L/∂x∂z,
+/// one column per range of either scan; the ranges that a reference surface was fitted to all have their share.
+std::optional<DisplacementEstimate> estimateDisplacement(const AlignmentProblem& problem,
+                                                         const SE2& reference_from_current,
+                                                         const EstimationOptions& options);
+
+}  // namespace sckf

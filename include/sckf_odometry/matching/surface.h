@@ -1,0 +1,47 @@
+// The straight pieces of surface that a scan sees.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace sckf {
+
+/// p turned by a quarter, counter-clockwise: the derivative of a rotated point by the angle.
+inline Eigen::Vector2d quarterTurn(const Eigen::Vector2d& p) { return {-p.y(), p.x()}; }
+
+struct SurfaceOptions {
+  double straightness = 1.7;     ///< a surface is straight while its points scatter by this many std of a range
+  double length = 1.0;           ///< [m] the stretch over which a surface is fitted grows up to this
+  double max_normal_std = 0.07;  ///< [rad] a surface whose direction is known worse is no surface but single points
+};
+
+/// The straight piece of surface around a point, fitted by total least squares to neighbouring points of the scan. How
+/// many depends on the range noise: a normal from a few noisy points is noise, and drags a match towards no motion.
+struct Surface {
+  Eigen::Vector2d centroid = Eigen::Vector2d::Zero();  ///< in base_link [m]
+  Eigen::Vector2d normal = Eigen::Vector2d::Zero();    ///< unit vector towards the laser, in base_link
+  int first = 0;                                       ///< index of the first point of the fit
+  int last = -1;                                       ///< … and of the last; last < first: no straight surface
+  double spread = 0.0;  ///< Σ (tᵀd)² − Σ (nᵀd)² over the fit, d = p − centroid, t along the surface [m²]
+
+  bool valid() const { return last >= first; }
+  int size() const { return last - first + 1; }
+  Eigen::Vector2d tangent() const { return quarterTurn(normal); }
+};
+
+/// Points in the order of their beams, as a scan has them.
+struct ScannedPoints {
+  std::vector<int> beam;               ///< index of the beam, increasing
+  std::vector<double> range;           ///< [m]
+  std::vector<Eigen::Vector2d> point;  ///< in base_link [m]
+  std::vector<Eigen::Vector2d> ray;    ///< ∂point/∂range, in base_link
+
+  std::size_t size() const { return point.size(); }
+};
+
+/// The surface around each point, invalid where there is none. range_noise: std of a range [m]. angle_increment:
+/// between neighbouring beams [rad].
+std::vector<Surface> fitSurfaces(const ScannedPoints& points, double range_noise, double angle_increment,
+                                 const SurfaceOptions& options);
+
+}  // namespace sckf

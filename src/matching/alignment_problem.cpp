@@ -1,0 +1,138 @@
+#include "sckf_odometry/matching/alignment_problem.h"
+
+#include <mrpt/poses/CPose2D.h>
+
+#include <algorithm>
+
+namespace sckf {
+
+namespace {
+
+double square(double v) { return v * v; }
+
+/// The points of the current scan with their nearest neighbours in the reference, by MRPT's k-d tree.
+mrpt::tfest::TMatchingPairList nearestNeighbours(const PreparedScan& reference, const PreparedScan& current,
+                                                 const SE2& reference_from_current, double max_distance) {
+  mrpt::maps::TMatchingParams params;
+  params.maxDistForCorrespondence = static_cast<float>(max_distance);
+  params.maxAngularDistForCorrespondence = 0.0F;
+  mrpt::tfest::TMatchingPairList list;
+  mrpt::maps::TMatchingExtraResults extra;
+  const mrpt::poses::CPose2D pose(reference_from_current.x, reference_from_current.y, reference_from_current.yaw);
+  reference.map.determineMatching2D(&current.map,
+                                    {reference_from_current.x, reference_from_current.y, reference_from_current.yaw},
+                                    list, params, extra);
+  return list;
+}
+
+/// From point i to the nearer of its neighbours in the order of the beams.
+Eigen::Vector2d toNextPoint(const ScannedPoints& points, std::size_t i) {
+  if (i == 0) return points.point[1] - points.point[0];
+  const Eigen::Vector2d before = points.point[i - 1] - points.point[i];
+  if (i + 1 == points.size()) return before;
+  const Eigen::Vector2d after = points.point[i + 1] - points.point[i];
+  return after.squaredNorm() < before.squaredNorm() ? after : before;
+}
+
+}  // namespace
+
+AlignmentProblem::AlignmentProblem(const PreparedScan& reference, const PreparedScan& current,
+                                   const SE2& reference_from_current, double max_distance, const PairOptions& options)
+    : reference_(reference), current_(current) {
+  for (const auto& match : nearestNeighbours(reference, current, reference_from_current, max_distance)) {
+    const Pair pair{static_cast<int>(match.globalIdx), static_cast<int>(match.localIdx)};
+    const bool on_surface = reference.surface[match.globalIdx].valid();
+    if (on_surface) {
+      addSurfacePair(pair, reference_from_current, options);
+    } else if (!current.surface[match.localIdx].valid()) {
+      addPointPair(pair, options);
+    }
+  }
+  fitKernel(reference_from_current, options);
+}
+
+void AlignmentProblem::addSurfacePair(const Pair& pair, const SE2& reference_from_current, const PairOptions& options) {
+  const auto i = static_cast<std::size_t>(pair.reference);
+  const auto j = static_cast<std::size_t>(pair.current);
+  const Surface& surface = reference_.surface[i];
+  const Eigen::Matrix2d C = reference_from_current.rotation();
+  const double incidence = surface.normal.dot(C * current_.points.ray[j]);
+  if (incidence > 0.0) return;  // the current scan would see the surface from behind
+  const Surface& seen = current_.surface[j];
+  if (seen.valid() && surface.normal.dot(C * seen.normal) < std::cos(options.max_normal_angle)) return;
+
+  const double along = surface.tangent().dot(reference_from_current * current_.points.point[j] - surface.centroid);
+  const double line_variance = square(reference_.range_noise * surface.normal.dot(reference_.points.ray[i])) *
+                               (1.0 / surface.size() + square(along) / surface.spread);
+  const double variance = square(current_.range_noise * incidence) + line_variance + square(options.surface_roughness);
+  pairs_.push_back(pair);
+  residuals_.push_back({pair.reference, pair.current, surface.normal, surface.centroid, &surface, std::sqrt(variance)});
+}
+
+void AlignmentProblem::addPointPair(const Pair& pair, const PairOptions& options) {
+  // Two scans never hit the same physical point: along the line to its neighbour, where the surface probably runs, a
+  // point is known no better than the points are spaced.
+  const auto i = static_cast<std::size_t>(pair.reference);
+  const Eigen::Vector2d step = toNextPoint(reference_.points, i);
+  const double variance = square(options.point_std) + square(reference_.range_noise) + square(current_.range_noise);
+  const Eigen::Vector2d along = step.normalized();
+  const Eigen::Vector2d& anchor = reference_.points.point[i];
+  pairs_.push_back(pair);
+  residuals_.push_back({pair.reference, pair.current, quarterTurn(along), anchor, nullptr, std::sqrt(variance)});
+  residuals_.push_back(
+      {pair.reference, pair.current, along, anchor, nullptr, std::sqrt(variance + step.squaredNorm())});
+}
+
+void AlignmentProblem::fitKernel(const SE2& reference_from_current, const PairOptions& options) {
+  constexpr double kGaussian = 1.4826;
+  constexpr double kMaxScale = 3.0;  // beyond, the pairs are wrong and not the surfaces rough
+  std::vector<double> deviations;
+  deviations.reserve(residuals_.size());
+  for (const Residual& residual : residuals_) {
+    if (residual.surface != nullptr) deviations.push_back(std::abs(terms(residual, reference_from_current).e));
+  }
+  if (!deviations.empty()) {
+    const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
+    std::nth_element(deviations.begin(), middle, deviations.end());
+    scale_ = std::clamp(kGaussian * *middle, 1.0, kMaxScale);
+  }
+  kernel_.c = options.robust_width * scale_;
+}
+
+double AlignmentProblem::overlap() const {
+  return static_cast<double>(pairs_.size()) / static_cast<double>(current_.size());
+}
+
+ResidualTerms AlignmentProblem::terms(const Residual& residual, const SE2& reference_from_current) const {
+  ResidualTerms terms;
+  terms.lever = reference_from_current.rotation() * current_.points.point[static_cast<std::size_t>(residual.current)];
+  terms.offset = terms.lever + reference_from_current.translation() - residual.anchor;
+  terms.e = residual.normal.dot(terms.offset) / residual.std;
+  terms.A << residual.normal, residual.normal.dot(quarterTurn(terms.lever));
+  terms.A /= residual.std;
+  return terms;
+}
+
+AlignmentProblem::NormalEquations AlignmentProblem::normalEquations(const SE2& reference_from_current) const {
+  NormalEquations equations;
+  for (const Residual& residual : residuals_) {
+    const ResidualTerms t = terms(residual, reference_from_current);
+    const double w = kernel_.weight(t.e) / (scale_ * scale_);
+    equations.information += w * t.A * t.A.transpose();
+    equations.gradient += w * t.e * t.A;
+  }
+  return equations;
+}
+
+double AlignmentProblem::cost(const SE2& reference_from_current) const {
+  constexpr double kUnpaired = 3.0;
+  const RobustKernel kernel{2.0};  // one for all alignments, whatever their own scale
+  double sum = kUnpaired * static_cast<double>(current_.size() - pairs_.size());
+  for (const Residual& residual : residuals_) {
+    const double share = residual.surface != nullptr ? 1.0 : 0.5;
+    sum += share * std::min(kUnpaired, kernel.loss(terms(residual, reference_from_current).e));
+  }
+  return sum;
+}
+
+}  // namespace sckf

@@ -1,0 +1,203 @@
+#include "sckf_odometry/matching/displacement_estimation.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace sckf {
+
+namespace {
+
+using Matrix3D = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3>;
+using MatrixDD = Displacement::MatrixDD;
+using MatrixD3 = Displacement::MatrixD3;
+
+/// The directions that the scans see, V_o of the paper (VII-A.2): (x, y, yaw) = start + basis · y, y = coordinates · …
+struct ObservableDirections {
+  Matrix3D basis;        // 3 × d
+  MatrixD3 coordinates;  // d × 3, with coordinates · basis = I
+
+  Eigen::Index dimension() const { return basis.cols(); }
+};
+
+/// Eigenvectors of the information, yaw scaled by the mean lever so that all are in metres. Noise of the normals alone
+/// makes information where there is none: along a corridor, E{δA δAᵀ} of normals that err by σ²/spread. It counts as
+/// spurious, and a direction must have clearly more than that.
+ObservableDirections observableDirections(const AlignmentProblem& problem, const SE2& x,
+                                          const EstimationOptions& options) {
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d spurious = Eigen::Matrix3d::Zero();
+  double lever_square_sum = 0.0;
+  for (const Residual& residual : problem.residuals()) {
+    const ResidualTerms t = problem.terms(residual, x);
+    const double w = problem.kernel().weight(t.e) / (problem.scale() * problem.scale());
+    information += w * t.A * t.A.transpose();
+    lever_square_sum += t.lever.squaredNorm();
+    if (residual.surface == nullptr) continue;
+    const Eigen::Vector2d tangent = residual.surface->tangent();
+    Eigen::Vector3d dA;  // ∂A by the angle of the normal
+    dA << tangent, tangent.dot(quarterTurn(t.lever));
+    const double angle_std = problem.reference().range_noise / std::sqrt(residual.surface->spread) / residual.std;
+    spurious += w * angle_std * angle_std * dA * dA.transpose();
+  }
+  const double lever = std::sqrt(lever_square_sum / static_cast<double>(problem.residuals().size()));
+  const Eigen::Vector3d unit(1.0, 1.0, 1.0 / lever);
+  const Eigen::Matrix3d scaled = unit.asDiagonal() * information * unit.asDiagonal();
+  const Eigen::Matrix3d scaled_spurious = unit.asDiagonal() * spurious * unit.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scaled);
+  std::vector<int> seen;
+  for (int k = 0; k < 3; ++k) {
+    const Eigen::Vector3d v = eigen.eigenvectors().col(k);
+    const double noise = v.dot(scaled_spurious * v);
+    const double signal = eigen.eigenvalues()(k) - noise;
+    const bool known = signal * options.max_std * options.max_std > 1.0;
+    if (known && eigen.eigenvalues()(k) > options.min_information_ratio * noise) seen.push_back(k);
+  }
+  ObservableDirections directions{Matrix3D(3, seen.size()), MatrixD3(seen.size(), 3)};
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    const Eigen::Vector3d v = eigen.eigenvectors().col(seen[i]);
+    directions.basis.col(static_cast<Eigen::Index>(i)) = unit.cwiseProduct(v);
+    directions.coordinates.row(static_cast<Eigen::Index>(i)) = v.cwiseQuotient(unit).transpose();
+  }
+  return directions;
+}
+
+/// Minimises the robust loss in the seen directions, pairs and weights fixed.
+SE2 minimise(const AlignmentProblem& problem, SE2 x, const ObservableDirections& seen) {
+  constexpr int kMaxIterations = 30;
+  constexpr double kStep = 1e-10;
+  for (int i = 0; i < kMaxIterations; ++i) {
+    const auto equations = problem.normalEquations(x);
+    const MatrixDD information = seen.basis.transpose() * equations.information * seen.basis;
+    const Eigen::VectorXd step = -information.ldlt().solve(seen.basis.transpose() * equations.gradient);
+    x = corrected(x, seen.basis * step);
+    if (step.norm() < kStep) break;
+  }
+  return x;
+}
+
+/// Second derivatives of the loss at the solution, by the displacement and by the ranges.
+struct LossDerivatives {
+  explicit LossDerivatives(const AlignmentProblem& problem)
+      : by_reference(Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(problem.reference().beams))),
+        by_current(Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(problem.current().beams))) {}
+
+  Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();  // ∂²L/∂x²
+  Eigen::Matrix3Xd by_reference;                      // ∂²L/∂x∂z_k, 3 × M_k
+  Eigen::Matrix3Xd by_current;                        // ∂²L/∂x∂z_{k+m}, 3 × M_{k+m}
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();  // Σ over blocks of beams of g gᵀ, g the gradient of a block
+  double loss_weight = 0.0;
+  double loss_square = 0.0;
+};
+
+/// A surface's line turns and shifts with every range that it was fitted to.
+void addSurfaceDerivatives(const AlignmentProblem& problem, const Residual& residual, const ResidualTerms& t,
+                           LossDerivatives& out) {
+  const Surface& surface = *residual.surface;
+  const ScannedPoints& points = problem.reference().points;
+  const Eigen::Vector2d& n = surface.normal;
+  const Eigen::Vector2d tangent = surface.tangent();
+  const double along = tangent.dot(t.offset);
+  Eigen::Vector3d dA;  // ∂A by the angle of the normal
+  dA << tangent, tangent.dot(quarterTurn(t.lever));
+  dA /= residual.std;
+  const Eigen::Vector3d by_angle = problem.kernel().influence(t.e) * dA;
+  const Eigen::Vector3d by_residual = problem.kernel().slope(t.e) / residual.std * t.A;
+  for (int j = surface.first; j <= surface.last; ++j) {
+    const auto k = static_cast<std::size_t>(j);
+    const Eigen::Vector2d d = points.point[k] - surface.centroid;
+    const Eigen::Vector2d& ray = points.ray[k];
+    const double turn = -(tangent.dot(ray) * n.dot(d) + tangent.dot(d) * n.dot(ray)) / surface.spread;
+    const double shift = -n.dot(ray) / surface.size() + along * turn;
+    out.by_reference.col(points.beam[k]) += by_angle * turn + by_residual * shift;
+  }
+}
+
+void addDerivatives(const AlignmentProblem& problem, const Residual& residual, const SE2& x, const ResidualTerms& t,
+                    LossDerivatives& out) {
+  const double influence = problem.kernel().influence(t.e);
+  const double slope = problem.kernel().slope(t.e);
+  out.hessian += slope * t.A * t.A.transpose();
+  out.hessian(2, 2) -= influence / residual.std * residual.normal.dot(t.lever);
+
+  const ScannedPoints& current = problem.current().points;
+  const auto c = static_cast<std::size_t>(residual.current);
+  const Eigen::Vector2d ray = x.rotation() * current.ray[c];
+  Eigen::Vector3d by_range = slope / residual.std * residual.normal.dot(ray) * t.A;
+  by_range.z() += influence / residual.std * residual.normal.dot(quarterTurn(ray));
+  out.by_current.col(current.beam[c]) += by_range;
+
+  if (residual.surface != nullptr) {
+    addSurfaceDerivatives(problem, residual, t, out);
+  } else {
+    const ScannedPoints& reference = problem.reference().points;
+    const auto r = static_cast<std::size_t>(residual.reference);
+    out.by_reference.col(reference.beam[r]) -= slope / residual.std * residual.normal.dot(reference.ray[r]) * t.A;
+  }
+}
+
+LossDerivatives differentiate(const AlignmentProblem& problem, const SE2& x, const EstimationOptions& options) {
+  LossDerivatives out(problem);
+  Eigen::Vector3d block_gradient = Eigen::Vector3d::Zero();
+  int block = -1;
+  for (const Residual& residual : problem.residuals()) {
+    const ResidualTerms t = problem.terms(residual, x);
+    addDerivatives(problem, residual, x, t, out);
+    const double w = problem.kernel().weight(t.e);
+    out.loss_weight += w;
+    out.loss_square += w * t.e * t.e;
+    const int its_block =
+        problem.current().points.beam[static_cast<std::size_t>(residual.current)] / options.correlated_beams;
+    if (its_block != block) {
+      out.scatter += block_gradient * block_gradient.transpose();
+      block_gradient.setZero();
+      block = its_block;
+    }
+    block_gradient += w * t.e * t.A;
+  }
+  out.scatter += block_gradient * block_gradient.transpose();
+  return out;
+}
+
+/// R_n: by how much the residuals scatter beyond what range noise explains, as a covariance of the displacement. Range
+/// noise gives R_z; the gradients of blocks of neighbouring beams give what is seen. Only the excess is matching noise.
+MatrixDD matchingNoise(const MatrixDD& range_covariance, const MatrixDD& seen_covariance) {
+  const Eigen::LLT<MatrixDD> range(range_covariance);
+  const MatrixDD L = range.matrixL();
+  MatrixDD whitened = range.matrixL().solve(seen_covariance);
+  whitened = range.matrixL().solve(whitened.transpose()).eval();
+  const Eigen::SelfAdjointEigenSolver<MatrixDD> eigen(0.5 * (whitened + whitened.transpose()));
+  const Eigen::VectorXd excess = (eigen.eigenvalues().array() - 1.0).max(0.0);
+  const MatrixDD half = L * eigen.eigenvectors();
+  return half * excess.asDiagonal() * half.transpose();
+}
+
+}  // namespace
+
+std::optional<DisplacementEstimate> estimateDisplacement(const AlignmentProblem& problem, const SE2& start,
+                                                         const EstimationOptions& options) {
+  const ObservableDirections seen = observableDirections(problem, start, options);
+  if (seen.dimension() == 0) return std::nullopt;
+  const SE2 x = minimise(problem, start, seen);
+  const LossDerivatives loss = differentiate(problem, x, options);
+  const MatrixDD hessian = seen.basis.transpose() * loss.hessian * seen.basis;
+  const MatrixD3 implicit = hessian.inverse() * seen.basis.transpose();
+
+  DisplacementEstimate estimate;
+  Displacement& z = estimate.displacement;
+  z.reference_from_current = x;
+  z.observable = seen.coordinates;
+  z.J_reference = -implicit * loss.by_reference;
+  z.J_current = -implicit * loss.by_current;
+  z.variance_reference = problem.reference().rangeVariances();
+  z.variance_current = problem.current().rangeVariances();
+  z.matching_noise = MatrixDD::Zero(seen.dimension(), seen.dimension());
+  z.matching_noise = matchingNoise(z.covariance(), implicit * loss.scatter * implicit.transpose());
+  estimate.residual_rms = std::sqrt(loss.loss_square / loss.loss_weight);
+  return estimate;
+}
+
+}  // namespace sckf
