@@ -1,0 +1,177 @@
+#!/usr/bin/python3
+"""A small world for tests: a robot drives through a room of straight walls; its bag has scans, odometry and the mount.
+
+Everything comes from one seed, so that a test sees the same bag every time.
+"""
+
+import argparse
+import math
+
+import numpy as np
+import rosbag
+import rospy
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan
+from tf2_msgs.msg import TFMessage
+
+START = 1000.0  # [s], time of the first message
+ODOMETRY_RATE = 20.0  # [1/s]
+SCAN_PERIOD = 0.23  # [s]: no multiple of that of the odometry, so that odometry has to be interpolated
+
+# A room with a niche, two boxes and a slanted wall: no two views of it are alike.
+OUTLINES = [
+    [(-5, -4), (3, -4), (3, -5), (5, -5), (5, 2), (3, 4), (-5, 4), (-5, 1), (-6, 1), (-6, -1), (-5, -1)],
+    [(-1.0, -0.5), (0.6, -0.8), (0.9, 0.4), (-0.7, 0.8)],
+    [(-4.3, 2.6), (-3.2, 2.6), (-3.2, 3.3), (-4.3, 3.3)],
+]
+
+
+def walls():
+    """All segments, n × 2 × 2."""
+    segments = []
+    for outline in OUTLINES:
+        segments += [(a, b) for a, b in zip(outline, outline[1:] + outline[:1])]
+    return np.array(segments, dtype=float)
+
+
+class Mount:
+    """Pose of the laser in base_link: translation, then rotation about z, then half a turn about x if upside down."""
+
+    def __init__(self, x=0.0, y=0.0, z=0.3, yaw=0.0, upside_down=False):
+        self.x, self.y, self.z, self.yaw, self.upside_down = x, y, z, yaw, upside_down
+
+    def bearings(self, angles):
+        """Directions in base_link of beams at these angles in the laser's plane."""
+        return self.yaw + (-angles if self.upside_down else angles)
+
+    def quaternion(self):
+        """x, y, z, w of Rz(yaw), times Rx(pi) if upside down."""
+        c, s = math.cos(self.yaw / 2), math.sin(self.yaw / 2)
+        return (c, s, 0.0, 0.0) if self.upside_down else (0.0, 0.0, s, c)
+
+
+def truth(t):
+    """Pose of base_link t seconds after the start: round the box in the middle, weaving, once in a minute."""
+    def position(time):
+        u = 2 * math.pi * time / 60.0
+        return np.array([3.0 * math.cos(u) - 0.5 * math.cos(3 * u), 2.4 * math.sin(u)])
+
+    x, y = position(t)
+    ahead = position(t + 1e-4) - position(t - 1e-4)
+    return np.array([x, y, math.atan2(ahead[1], ahead[0])])
+
+
+def compose(a, b):
+    c, s = math.cos(a[2]), math.sin(a[2])
+    return np.array([a[0] + c * b[0] - s * b[1], a[1] + s * b[0] + c * b[1], a[2] + b[2]])
+
+
+def between(a, b):
+    c, s = math.cos(a[2]), math.sin(a[2])
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    yaw = math.atan2(math.sin(b[2] - a[2]), math.cos(b[2] - a[2]))
+    return np.array([c * dx + s * dy, -s * dx + c * dy, yaw])
+
+
+def cast(origin, bearings, segments):
+    """Range along each bearing to the nearest segment, inf where there is none."""
+    directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)[:, None, :]
+    a = segments[None, :, 0, :] - origin
+    along = (segments[:, 1] - segments[:, 0])[None]
+    cross = lambda p, q: p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0]
+    with np.errstate(divide='ignore', invalid='ignore'):
+        denominator = cross(directions, along)
+        ranges = cross(a, along) / denominator
+        share = cross(a, directions) / denominator
+    hit = (ranges > 0) & (share >= 0) & (share <= 1)
+    return np.where(hit, ranges, np.inf).min(axis=1)
+
+
+def odometry(duration, rng):
+    """Poses in the wheels' own frame, which starts at the origin: scale and heading drift, and noise."""
+    poses = [np.zeros(3)]
+    steps = int(duration * ODOMETRY_RATE)
+    for i in range(steps):
+        motion = between(truth(i / ODOMETRY_RATE), truth((i + 1) / ODOMETRY_RATE))
+        way = math.hypot(motion[0], motion[1])
+        noise = rng.normal(size=3) * math.sqrt(way) * np.array([0.01, 0.01, 0.02])
+        motion = motion * np.array([1.03, 1.0, 1.0]) + np.array([0.0, 0.0, 0.02 * way]) + noise
+        poses.append(compose(poses[-1], motion))
+    return poses
+
+
+def odometry_message(stamp, pose):
+    message = Odometry()
+    message.header.stamp = stamp
+    message.header.frame_id = 'odom'
+    message.child_frame_id = 'base_link'
+    message.pose.pose.position.x, message.pose.pose.position.y = pose[0], pose[1]
+    message.pose.pose.orientation.z, message.pose.pose.orientation.w = math.sin(pose[2] / 2), math.cos(pose[2] / 2)
+    return message
+
+
+def scan_message(stamp, pose, mount, segments, rng, beams=360, noise=0.01):
+    message = LaserScan()
+    message.header.stamp = stamp
+    message.header.frame_id = 'laser'
+    message.angle_min = -math.pi
+    message.angle_increment = 2 * math.pi / beams
+    message.angle_max = message.angle_min + (beams - 1) * message.angle_increment
+    message.range_min, message.range_max = 0.05, 30.0
+    angles = message.angle_min + np.arange(beams) * message.angle_increment
+    laser = compose(pose, np.array([mount.x, mount.y, 0.0]))
+    ranges = cast(laser[:2], pose[2] + mount.bearings(angles), segments)
+    message.ranges = (ranges + rng.normal(size=beams) * noise).astype(np.float32).tolist()
+    return message
+
+
+def mount_message(stamp, mount):
+    transform = TransformStamped()
+    transform.header.stamp = stamp
+    transform.header.frame_id, transform.child_frame_id = 'base_link', 'laser'
+    t, r = transform.transform.translation, transform.transform.rotation
+    t.x, t.y, t.z = mount.x, mount.y, mount.z
+    r.x, r.y, r.z, r.w = mount.quaternion()
+    return TFMessage([transform])
+
+
+def true_trajectory(stamps):
+    """Pose of base_link at these stamps [s] in the frame of its start: what a perfect estimator would say."""
+    return np.array([between(truth(0.0), truth(stamp - START)) for stamp in stamps])
+
+
+def messages(duration=45.0, mount=None, seed=1):
+    """(topic, message, stamp) in the order of time."""
+    mount = mount or Mount(x=0.2)
+    rng = np.random.default_rng(seed)
+    segments = walls()
+    out = [('/tf_static', mount_message(rospy.Time.from_sec(START), mount), START)]
+    for i, pose in enumerate(odometry(duration, rng)):
+        stamp = START + i / ODOMETRY_RATE
+        out.append(('/odom', odometry_message(rospy.Time.from_sec(stamp), pose), stamp))
+    t = 0.1
+    while t < duration - 0.1:
+        scan = scan_message(rospy.Time.from_sec(START + t), truth(t), mount, segments, rng)
+        out.append(('/scan', scan, START + t))
+        t += SCAN_PERIOD
+    return sorted(out, key=lambda entry: entry[2])
+
+
+def write(path, **arguments):
+    with rosbag.Bag(path, 'w') as bag:
+        for topic, message, stamp in messages(**arguments):
+            bag.write(topic, message, rospy.Time.from_sec(stamp))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('bag')
+    parser.add_argument('--duration', type=float, default=45.0, help='[s]')
+    parser.add_argument('--seed', type=int, default=1)
+    arguments = parser.parse_args()
+    write(arguments.bag, duration=arguments.duration, seed=arguments.seed)
+
+
+if __name__ == '__main__':
+    main()
