@@ -28,6 +28,7 @@ class OdometryBuffer {
   bool empty() const { return samples_.empty(); }
   Stamp oldest() const { return samples_.front().stamp; }
   Stamp newest() const { return samples_.back().stamp; }
+  const OdometrySample& newestSample() const { return samples_.back(); }
   bool covers(Stamp stamp) const { return !empty() && oldest() <= stamp && stamp <= newest(); }
 
   struct Step {

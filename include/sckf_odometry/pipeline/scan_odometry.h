@@ -4,17 +4,29 @@
 
 #include <Eigen/Geometry>
 #include <deque>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "sckf_odometry/core/dead_reckoning.h"
 #include "sckf_odometry/core/fusion_method.h"
 #include "sckf_odometry/matching/scan_matcher.h"
 #include "sckf_odometry/pipeline/odometry_buffer.h"
+#include "sckf_odometry/pipeline/reference_policy.h"
+#include "sckf_odometry/pipeline/twist_window.h"
 
 namespace sckf {
+
+/// What happens to a displacement that contradicts the wheels.
+struct GateOptions {
+  double probability = 0.999;         ///< χ² gate: an innovation less likely than 1 − this contradicts
+  bool trust_scans_on_slip = true;    ///< where the scans match well, put the contradiction down to the wheels
+  double slip_std_translation = 0.3;  ///< [m] what the wheels may have been wrong by in such an interval …
+  double slip_std_yaw = 0.3;          ///< [rad] … and in yaw
+  double slip_min_overlap = 0.4;      ///< scans match well if at least this share of the points has a partner …
+  double slip_max_residual = 2.0;     ///< … and the weighted residuals are at most this
+};
 
 struct PipelineOptions {
   std::string method = "sckf";  ///< one of fusionMethodNames()
@@ -22,12 +34,11 @@ struct PipelineOptions {
   bool prefer_twist_covariance = false;  ///< use the twist covariance of the odometry message where it is sensible
   ScanOptions scan;
   MatcherOptions matcher;
-  double kf_dist_linear = 1.0;     ///< [m] a new reference scan after this way from the last
-  double kf_dist_angular = 0.7;    ///< [rad] … or this rotation
-  double kf_min_overlap = 0.6;      ///< … or when a smaller share of the points overlaps
-  double gate_probability = 0.999;  ///< χ² gate: an innovation less likely than 1 − this is refused
-  bool slip = true;
-  std::size_t max_waiting_scans = 50;  ///< scans that wait for odometry; beyond, the oldest is dropped
+  ReferenceOptions reference;
+  GateOptions gate;
+  double twist_window = 0.2;    ///< [s] the twist is the mean over this time: stamps of odometry come in bursts
+  double max_scan_delay = 5.0;  ///< [s] a scan that is older than the newest odometry by more is not used
+  int max_waiting_scans = 50;   ///< scans that wait for odometry; beyond, the oldest is given up
 };
 
 /// Where base_link is in odom, with the covariance of the additive error in x, y, yaw.
@@ -35,45 +46,45 @@ struct Estimate {
   Stamp stamp{0};
   SE2 odom_from_base;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d twist = Eigen::Vector3d::Zero();  ///< vx, vy [m/s], yaw rate [rad/s] in base_link
-  Eigen::Matrix3d twist_covariance = Eigen::Matrix3d::Zero();
+  Twist twist;
 };
 
 /// What became of a scan.
 enum class ScanOutcome {
-  kReference,   ///< the first scan, or the first after a gap: it became the reference, nothing to compare it with
+  kReference,   ///< the first scan: it became the reference, there is nothing to compare it with
   kUpdated,     ///< its displacement corrected the estimate
-  kNoMatch,     ///< the matcher found no displacement: the wheels carry on
-  kGated,       ///< the displacement contradicts the prediction beyond the gate: the wheels carry on
-  kSlip,        ///< the displacement contradicts the wheels, and the scans are trusted for this interval
+  kSlip,        ///< its displacement contradicts the wheels, and corrected the estimate: the wheels slipped
+  kGated,       ///< its displacement contradicts the prediction beyond the gate: the wheels carry on
+  kNoMatch,     ///< there is no displacement: the wheels carry on
+  kUnusable,    ///< the scan itself is bad: the wheels carry on
+  kOutOfOrder,  ///< not newer than the estimate: not used
   kNoOdometry,  ///< no odometry at its stamp: not used
-  kOutOfOrder,  ///< not newer than the last scan: not used
-  kUnusable,    ///< the scan itself is bad: not used
 };
 std::string toString(ScanOutcome outcome);
 
 struct ScanReport {
+  Stamp stamp{0};
   ScanOutcome outcome = ScanOutcome::kReference;
-  std::string reason;                    ///< in words, where the scan was not used
-  Estimate estimate;                     ///< at the scan's stamp
-  Match match;                           ///< of a scan that was compared with a reference
-  DisplacementPrediction prediction;     ///< what the filter expected
-  std::optional<Innovation> innovation;  ///< of a match
-  bool new_reference = false;
+  std::string reason;                        ///< in words, where the scan did not correct the estimate
+  std::optional<Estimate> estimate;          ///< at the scan's stamp; empty if out of order or without odometry
+  Match match;                               ///< of a scan that was compared with a reference
+  DisplacementPrediction prediction;         ///< what the filter expected
+  std::optional<Innovation> innovation;      ///< where there is a displacement
   Stamp reference_stamp{0};                  ///< of the scan that it was compared with
-  std::shared_ptr<const PreparedScan> scan;  ///< the scan's points in base_link
+  bool new_reference = false;                ///< it became the reference
+  std::shared_ptr<const PreparedScan> scan;  ///< its points in base_link; null if it was not used
 };
 
 class ScanOdometry {
  public:
-  /// Throws std::invalid_argument naming the option, its value and what is allowed.
+  /// Throws std::invalid_argument if there is no method of that name.
   explicit ScanOdometry(const PipelineOptions& options);
-  ~ScanOdometry();
 
+  /// Samples may come in any order as long as they are newer than the last scan taken.
   OdometryBuffer::Insertion addOdometry(const OdometrySample& sample);
 
   /// The scan waits until odometry brackets its stamp. base_from_laser: the mount at the time of the scan.
-  void addScan(const LaserScan& scan, const Eigen::Isometry3d& base_from_laser);
+  void addScan(LaserScan scan, const Eigen::Isometry3d& base_from_laser);
 
   /// Takes the scans whose time has come, oldest first, and says what became of each.
   std::vector<ScanReport> process();
@@ -81,21 +92,37 @@ class ScanOdometry {
   /// The estimate carried on by the wheels to the newest odometry; empty before the first odometry.
   std::optional<Estimate> latest() const;
 
+  const PipelineOptions& options() const { return options_; }
+
  private:
   struct WaitingScan {
     LaserScan scan;
     Eigen::Isometry3d base_from_laser;
   };
-  ScanReport processScan(const WaitingScan& waiting);
+
+  ScanReport take(const WaitingScan& waiting);
+  void start(const OdometrySample& first);
+  void propagateTo(Stamp stamp);
+  void compareWithReference(ScanReport& report);
+  bool fuse(ScanReport& report);
+  bool looksLikeSlip(const Match& match) const;
+  void carryOn();
+  OdometryIncrement increment(const OdometryBuffer::Step& step) const;
+  Estimate estimate() const;
 
   PipelineOptions options_;
   ScanMatcher matcher_;
+  ReferencePolicy reference_policy_;
   OdometryBuffer odometry_;
+  TwistWindow twist_;
   std::deque<WaitingScan> waiting_;
-  std::unique_ptr<FusionMethod> filter_;
+  std::vector<ScanReport> given_up_;
+
+  std::unique_ptr<FusionMethod> filter_;  // at filter_stamp_; null before the first odometry
   Stamp filter_stamp_{0};
-  SE2 last_;
   std::shared_ptr<const PreparedScan> reference_;
+  std::optional<DeadReckoning> carried_on_;  // the estimate, from filter_stamp_ on by the wheels to carried_on_stamp_
+  Stamp carried_on_stamp_{0};
 };
 
 }  // namespace sckf

@@ -1,0 +1,32 @@
+// When a scan becomes the new reference.
+#pragma once
+
+#include "sckf_odometry/core/se2.h"
+
+namespace sckf {
+
+/// Drift grows per reference and not per scan, so a reference is kept as long as scans can be compared with it well:
+/// while the next scan, as far away from this one as this one from the last, will probably be within the limits.
+/// Zero distances make every scan a reference, which is the algorithm of the paper.
+struct ReferenceOptions {
+  double kf_dist_linear = 1.0;   ///< [m] largest way from the reference to a scan that is compared with it
+  double kf_dist_angular = 0.7;  ///< [rad] largest rotation
+  double kf_min_overlap = 0.6;   ///< a smaller share of points with a partner makes the scan the new reference
+  int kf_max_failures = 2;       ///< so does this many scans in a row that gave no displacement
+};
+
+class ReferencePolicy {
+ public:
+  explicit ReferencePolicy(const ReferenceOptions& options) : options_(options) {}
+
+  /// Whether a scan becomes the reference. reference_from_scan: its pose as estimated now. overlap: of its match. used:
+  /// whether its displacement corrected the estimate.
+  bool replaces(const SE2& reference_from_scan, double overlap, bool used);
+
+ private:
+  ReferenceOptions options_;
+  SE2 last_;  // reference_from_scan of the scan before
+  int failures_ = 0;
+};
+
+}  // namespace sckf
