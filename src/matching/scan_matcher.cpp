@@ -110,12 +110,6 @@ class Search {
   const MatcherOptions& options_;
 };
 
-Match failed(MatchFailure failure) {
-  Match match;
-  match.failure = failure;
-  return match;
-}
-
 }  // namespace
 
 std::string toString(MatchFailure failure) {
@@ -136,28 +130,32 @@ std::string toString(MatchFailure failure) {
 
 Match ScanMatcher::match(const PreparedScan& reference, const PreparedScan& current,
                          const DisplacementPrediction& prediction) const {
-  const std::optional<Alignment> aligned = Search(reference, current, prediction, options_).run();
-  if (!aligned) return failed(MatchFailure::kTooFewPairs);
-
   Match match;
+  const std::optional<Alignment> aligned = Search(reference, current, prediction, options_).run();
+  if (!aligned) {
+    match.failure = MatchFailure::kTooFewPairs;
+    return match;
+  }
+  const SE2& start = aligned->reference_from_current;
+  std::optional<DisplacementEstimate> estimate = estimateDisplacement(aligned->problem, start, options_.estimation);
   match.pairs = aligned->problem.pairs();
   match.overlap = aligned->problem.overlap();
-  const auto estimate = estimateDisplacement(aligned->problem, aligned->reference_from_current, options_.estimation);
+  match.residual_rms = estimate ? estimate->residual_rms : 0.0;
   if (match.overlap < options_.min_overlap) {
     match.failure = MatchFailure::kNoOverlap;
   } else if (!estimate) {
     match.failure = MatchFailure::kNotObservable;
+  } else if (ranAway(estimate->displacement.reference_from_current, start)) {
+    match.failure = MatchFailure::kDiverged;
   } else {
-    const Eigen::Vector3d moved = error(estimate->displacement.reference_from_current, aligned->reference_from_current);
-    const bool settled = moved.allFinite() && moved.cwiseAbs().maxCoeff() <= options_.max_refinement;
-    match.residual_rms = estimate->residual_rms;
-    if (settled) {
-      match.displacement = estimate->displacement;
-    } else {
-      match.failure = MatchFailure::kDiverged;
-    }
+    match.displacement.emplace(std::move(estimate->displacement));
   }
   return match;
+}
+
+bool ScanMatcher::ranAway(const SE2& estimated, const SE2& aligned) const {
+  const Eigen::Vector3d moved = error(estimated, aligned);
+  return !moved.allFinite() || moved.cwiseAbs().maxCoeff() > options_.max_refinement;
 }
 
 }  // namespace sckf

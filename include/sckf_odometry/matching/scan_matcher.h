@@ -57,6 +57,8 @@ class ScanMatcher {
               const DisplacementPrediction& prediction) const;
 
  private:
+  bool ranAway(const SE2& estimated, const SE2& aligned) const;
+
   MatcherOptions options_;
 };
 

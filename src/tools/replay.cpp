@@ -1,0 +1,306 @@
+// A bag through the pipeline, as fast as it goes: trajectory and what became of every scan.
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+
+#include <algorithm>
+#include <boost/program_options.hpp>
+#include <chrono>
+#include <cstdio>
+#include <deque>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <stdexcept>
+
+#include "sckf_odometry/pipeline/scan_odometry.h"
+#include "sckf_odometry/ros/conversions.h"
+#include "sckf_odometry/ros/parameters.h"
+#include "sckf_odometry/ros/tf_input.h"
+#include "sckf_odometry/tools/progress_bar.h"
+
+namespace sckf {
+
+namespace {
+
+struct Arguments {
+  std::string bag;
+  std::string trajectory;
+  std::string csv;
+  std::string params;
+  std::string method;
+  std::string scan_topic = "/scan";
+  std::string odom_topic = "/odom";
+};
+
+/// A file that is complete or not there: it gets its name when everything has been written.
+class OutputFile {
+ public:
+  explicit OutputFile(const std::string& path) : path_(path) {
+    if (path_.empty()) return;
+    file_ = std::fopen((path_ + ".part").c_str(), "w");
+    if (file_ == nullptr) throw std::runtime_error(path_ + ": cannot be written");
+  }
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+  ~OutputFile() {
+    if (file_ != nullptr) std::fclose(file_);
+  }
+
+  explicit operator bool() const { return file_ != nullptr; }
+
+  template <typename... Values>
+  void print(const char* format, Values... values) {
+    std::fprintf(file_, format, values...);
+  }
+
+  void finish() {
+    if (file_ == nullptr) return;
+    const bool failed = std::ferror(file_) != 0;
+    const bool closed = std::fclose(file_) == 0;
+    file_ = nullptr;
+    if (failed || !closed || std::rename((path_ + ".part").c_str(), path_.c_str()) != 0) {
+      throw std::runtime_error(path_ + ": cannot be written");
+    }
+  }
+
+ private:
+  std::string path_;
+  std::FILE* file_ = nullptr;
+};
+
+/// The stamp in seconds, digit for digit.
+std::string decimal(Stamp stamp) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%lld.%09lld", static_cast<long long>(stamp.count() / 1000000000),
+                static_cast<long long>(stamp.count() % 1000000000));
+  return text;
+}
+
+void writeTumLine(OutputFile& file, const Estimate& estimate) {
+  const SE2& pose = estimate.odom_from_base;
+  file.print("%s %.9f %.9f 0 0 0 %.12f %.12f\n", decimal(estimate.stamp).c_str(), pose.x, pose.y,
+             std::sin(0.5 * pose.yaw), std::cos(0.5 * pose.yaw));
+}
+
+void writeCsvHeader(OutputFile& file) {
+  file.print(
+      "stamp,x,y,yaw,var_x,cov_xy,cov_xyaw,var_y,cov_yyaw,var_yaw,"
+      "reference_stamp,displacement_x,displacement_y,displacement_yaw,dimension,"
+      "innovation_1,innovation_2,innovation_3,nis,pairs,overlap,residual_rms,new_reference,outcome,reason\n");
+}
+
+void writeCsvLine(OutputFile& file, const ScanReport& report) {
+  file.print("%s", decimal(report.stamp).c_str());
+  if (report.estimate) {
+    const SE2& pose = report.estimate->odom_from_base;
+    const Eigen::Matrix3d& P = report.estimate->covariance;
+    file.print(",%.9f,%.9f,%.9f,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", pose.x, pose.y, pose.yaw, P(0, 0), P(0, 1), P(0, 2),
+               P(1, 1), P(1, 2), P(2, 2));
+  } else {
+    file.print(",,,,,,,,,");
+  }
+  if (report.innovation) {
+    const Displacement& z = *report.match.displacement;
+    const SE2& displacement = z.reference_from_current;
+    file.print(",%s,%.9f,%.9f,%.9f,%d", decimal(report.reference_stamp).c_str(), displacement.x, displacement.y,
+               displacement.yaw, static_cast<int>(z.dimension()));
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      if (i < z.dimension()) {
+        file.print(",%.9g", report.innovation->residual(i));
+      } else {
+        file.print(",");
+      }
+    }
+    file.print(",%.9g", report.innovation->nis());
+  } else {
+    file.print(",,,,,,,,,");
+  }
+  file.print(",%zu,%.6f,%.6f,%d,%s,\"%s\"\n", report.match.pairs.size(), report.match.overlap,
+             report.match.residual_rms, report.new_reference ? 1 : 0, toString(report.outcome).c_str(),
+             report.reason.c_str());
+}
+
+/// Times of the scans' processing, and what became of them.
+class Statistics {
+ public:
+  void add(const ScanReport& report, double time) {
+    ++outcomes_[report.outcome];
+    times_.push_back(time);
+  }
+
+  void print(double log_duration, double wall_time) {
+    std::printf("%zu scans", times_.size());
+    for (const auto& [outcome, count] : outcomes_) std::printf(", %zu %s", count, toString(outcome).c_str());
+    std::printf("\n");
+    if (times_.empty()) return;
+    std::sort(times_.begin(), times_.end());
+    std::printf("time of a scan: median %.3f ms, 95 %% below %.3f ms, longest %.3f ms\n", 1e3 * quantile(0.5),
+                1e3 * quantile(0.95), 1e3 * times_.back());
+    std::printf("%.1f s of log in %.2f s: %.0f times real time\n", log_duration, wall_time, log_duration / wall_time);
+  }
+
+ private:
+  double quantile(double q) const {
+    return times_[static_cast<std::size_t>(q * static_cast<double>(times_.size() - 1))];
+  }
+
+  std::map<ScanOutcome, std::size_t> outcomes_;
+  std::vector<double> times_;
+};
+
+class Replay {
+ public:
+  Replay(const Arguments& arguments, const Options& options)
+      : arguments_(arguments),
+        options_(options),
+        pipeline_(options.pipeline),
+        tf_(options.node.base_frame, options.node.use_tf_odometry ? options.node.tf_odometry_frame : "",
+            Stamp(std::chrono::seconds(1))),
+        trajectory_(arguments.trajectory),
+        csv_(arguments.csv) {
+    if (csv_) writeCsvHeader(csv_);
+  }
+
+  void run() {
+    const rosbag::Bag bag(arguments_.bag, rosbag::bagmode::Read);
+    rosbag::View view(bag, rosbag::TopicQuery({"/tf", "/tf_static", arguments_.scan_topic, arguments_.odom_topic}));
+    const auto begin = std::chrono::steady_clock::now();
+    ProgressBar progress(view.size());
+    for (const rosbag::MessageInstance& message : view) {
+      take(message);
+      progress.advance();
+    }
+    progress.finish();
+    if (scans_ == 0) {
+      throw std::runtime_error(arguments_.bag + ": no sensor_msgs/LaserScan on " + arguments_.scan_topic +
+                               "; see --scan-topic");
+    }
+    if (!waiting_.empty()) {
+      std::fprintf(stderr, "%zu scans not used: no transform %s -> %s: %s\n", waiting_.size(),
+                   options_.node.base_frame.c_str(), frameName(waiting_.back()->header.frame_id).c_str(),
+                   mount_problem_.c_str());
+    }
+    trajectory_.finish();
+    csv_.finish();
+    const double log_duration = view.size() > 0 ? (view.getEndTime() - view.getBeginTime()).toSec() : 0.0;
+    statistics_.print(log_duration, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+  }
+
+ private:
+  void take(const rosbag::MessageInstance& message) {
+    if (const auto transforms = message.instantiate<tf2_msgs::TFMessage>()) {
+      tf_.add(*transforms, message.getTopic() == "/tf_static");
+      for (const OdometrySample& sample : tf_.takeOdometry()) pipeline_.addOdometry(sample);
+    } else if (const auto odometry = message.instantiate<nav_msgs::Odometry>()) {
+      addOdometry(*odometry);
+    } else if (const auto scan = message.instantiate<sensor_msgs::LaserScan>()) {
+      ++scans_;
+      waiting_.push_back(scan);
+    }
+    passScansWithMount();
+    process();
+  }
+
+  void addOdometry(const nav_msgs::Odometry& message) {
+    if (options_.node.use_tf_odometry) return;
+    std::string problem;
+    const auto sample = toOdometrySample(message, &problem);
+    if (sample) {
+      pipeline_.addOdometry(*sample);
+    } else {
+      std::fprintf(stderr, "odometry at %.9f not used: %s\n", message.header.stamp.toSec(), problem.c_str());
+    }
+  }
+
+  void passScansWithMount() {
+    while (!waiting_.empty()) {
+      const auto mount = tf_.baseFrom(frameName(waiting_.front()->header.frame_id), &mount_problem_);
+      if (!mount) return;
+      pipeline_.addScan(toScan(*waiting_.front()), *mount);
+      waiting_.pop_front();
+    }
+  }
+
+  void process() {
+    const auto begin = std::chrono::steady_clock::now();
+    const std::vector<ScanReport> reports = pipeline_.process();
+    const double time = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    for (const ScanReport& report : reports) {
+      statistics_.add(report, time / static_cast<double>(reports.size()));
+      if (trajectory_ && report.estimate) writeTumLine(trajectory_, *report.estimate);
+      if (csv_) writeCsvLine(csv_, report);
+    }
+  }
+
+  Arguments arguments_;
+  Options options_;
+  ScanOdometry pipeline_;
+  TfInput tf_;
+  OutputFile trajectory_;
+  OutputFile csv_;
+  Statistics statistics_;
+  std::deque<sensor_msgs::LaserScan::ConstPtr> waiting_;  // for their mount
+  std::string mount_problem_;
+  std::size_t scans_ = 0;
+};
+
+/// Nothing if the help was asked for, and shown.
+std::optional<Arguments> parse(int argc, char** argv) {
+  namespace po = boost::program_options;
+  Arguments arguments;
+  po::options_description shown("options");
+  // clang-format off
+  shown.add_options()("help,h", "show this help")
+    ("trajectory", po::value(&arguments.trajectory), "write the poses at the scans, in the format of TUM")
+    ("csv", po::value(&arguments.csv), "write what became of each scan")
+    ("params", po::value(&arguments.params), "parameter file, as config/sckf_odometry.yaml")
+    ("method", po::value(&arguments.method), "instead of the parameter file's method")
+    ("scan-topic", po::value(&arguments.scan_topic)->default_value(arguments.scan_topic), "")
+    ("odom-topic", po::value(&arguments.odom_topic)->default_value(arguments.odom_topic), "");
+  // clang-format on
+  po::options_description all(shown);
+  all.add_options()("bag", po::value(&arguments.bag));
+  po::positional_options_description positional;
+  positional.add("bag", 1);
+  po::variables_map values;
+  po::store(po::command_line_parser(argc, argv).options(all).positional(positional).run(), values);
+  if (values.count("help") != 0) {
+    std::cout << "usage: replay BAG --trajectory OUT.tum [options]\n\n"
+                 "Runs a bag through the very pipeline that the nodelet runs, as fast as it goes.\n\n"
+              << shown;
+    return std::nullopt;
+  }
+  po::notify(values);
+  if (arguments.bag.empty()) throw po::error("a BAG is needed; see --help");
+  if (arguments.trajectory.empty() && arguments.csv.empty()) throw po::error("--trajectory or --csv is needed");
+  return arguments;
+}
+
+Options optionsFor(const Arguments& arguments) {
+  Options options;
+  if (!arguments.params.empty()) {
+    std::vector<std::string> unknown;
+    options = sckf::readOptions(ParameterFile(arguments.params), &unknown);
+    for (const std::string& name : unknown) std::cerr << arguments.params << ": there is no parameter " << name << "\n";
+  }
+  if (!arguments.method.empty()) options.pipeline.method = arguments.method;
+  return options;
+}
+
+}  // namespace
+
+}  // namespace sckf
+
+int main(int argc, char** argv) {
+  try {
+    const auto arguments = sckf::parse(argc, argv);
+    if (arguments) sckf::Replay(*arguments, sckf::optionsFor(*arguments)).run();
+    return 0;
+  } catch (const boost::program_options::error& error) {
+    std::cerr << "replay: " << error.what() << '\n';
+    return 2;
+  } catch (const std::exception& error) {
+    std::cerr << "replay: " << error.what() << '\n';
+    return 1;
+  }
+}
