@@ -1,0 +1,64 @@
+#!/usr/bin/python3
+"""The scripts that a person runs: executable, free of what shellcheck finds, and helpful when called wrongly."""
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import unittest
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import List
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def scripts(interpreter: str) -> List[Path]:
+    """The files in scripts/ and .ci/ whose first line names the interpreter."""
+    files = [path for folder in ("scripts", ".ci") for path in sorted((ROOT / folder).iterdir()) if path.is_file()]
+    return [path for path in files if path.read_bytes().split(b"\n", 1)[0] == b"#!" + interpreter.encode()]
+
+
+def run(*command: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([str(each) for each in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                          universal_newlines=True, check=False)
+
+
+class ScriptsTest(unittest.TestCase):
+    def test_all_are_there(self) -> None:
+        names = {path.name for path in scripts("/bin/bash") + scripts("/usr/bin/python3")}
+        self.assertLessEqual({"setup", "demo", "test", "run", "evaluate", "plot", "run_tests"}, names)
+
+    def test_every_script_is_executable(self) -> None:
+        for path in scripts("/bin/bash") + scripts("/usr/bin/python3"):
+            self.assertTrue(os.access(path, os.X_OK), path)
+
+    def test_bash_scripts_are_sound(self) -> None:
+        for path in scripts("/bin/bash"):
+            self.assertIn("set -euo pipefail", path.read_text(encoding="utf-8"), path)
+            done = run("bash", "-n", path)
+            self.assertEqual(done.returncode, 0, done.stdout)
+
+    @unittest.skipUnless(shutil.which("shellcheck"), "shellcheck is not installed")
+    def test_shellcheck_finds_nothing(self) -> None:
+        done = run("shellcheck", *scripts("/bin/bash"))
+        self.assertEqual(done.returncode, 0, done.stdout)
+
+    def test_python_scripts_explain_themselves(self) -> None:
+        for path in scripts("/usr/bin/python3"):
+            done = run(path, "--help")
+            self.assertEqual(done.returncode, 0, done.stdout)
+            self.assertIn("usage:", done.stdout)
+
+    def test_a_wrong_argument_is_refused_before_anything_is_done(self) -> None:
+        for name in ("setup", "test"):
+            done = run(ROOT / "scripts" / name, "--nonsense")
+            self.assertNotEqual(done.returncode, 0)
+            self.assertIn("unknown argument --nonsense", done.stdout)
+
+    def test_the_demos_launch_file_is_xml(self) -> None:
+        self.assertEqual(ElementTree.parse(ROOT / "scripts" / "demo.launch").getroot().tag, "launch")
+
+
+if __name__ == "__main__":
+    unittest.main()
