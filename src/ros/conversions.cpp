@@ -143,10 +143,10 @@ nav_msgs::Odometry toOdometryMessage(const Estimate& estimate, const std::string
   message.child_frame_id = base_frame;
   message.pose.pose = toPose(estimate.odom_from_base);
   message.pose.covariance = toMessageCovariance(estimate.covariance);
-  message.twist.twist.linear.x = estimate.twist.x();
-  message.twist.twist.linear.y = estimate.twist.y();
-  message.twist.twist.angular.z = estimate.twist.z();
-  message.twist.covariance = toMessageCovariance(estimate.twist_covariance);
+  message.twist.twist.linear.x = estimate.twist.mean.x();
+  message.twist.twist.linear.y = estimate.twist.mean.y();
+  message.twist.twist.angular.z = estimate.twist.mean.z();
+  message.twist.covariance = toMessageCovariance(estimate.twist.covariance);
   return message;
 }
 

@@ -37,12 +37,12 @@ void EstimatePublisher::publishTransform(const Estimate& estimate) {
                                  : toTransform(pose, estimate.stamp, options_.odom_frame, options_.base_frame));
 }
 
-void EstimatePublisher::publishScan(const ScanReport& report) {
-  pose_.publish(toPoseMessage(report.estimate, options_.odom_frame));
-  path_recorder_.add(report.estimate.stamp, report.estimate.odom_from_base);
-  if (report.scan) {
-    cloud_recorder_.add(report.estimate.odom_from_base, report.scan->point);
-    cloud_stamp_ = report.estimate.stamp;
+void EstimatePublisher::publishScan(const Estimate& estimate, const PreparedScan* scan) {
+  pose_.publish(toPoseMessage(estimate, options_.odom_frame));
+  path_recorder_.add(estimate.stamp, estimate.odom_from_base);
+  if (scan != nullptr) {
+    cloud_recorder_.add(estimate.odom_from_base, scan->points.point);
+    cloud_stamp_ = estimate.stamp;
   }
   views_changed_ = true;
 }

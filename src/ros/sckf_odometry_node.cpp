@@ -225,7 +225,7 @@ void ScKfOdometryNode::passScansWithMount() {
     }
   }
   scans_without_mount_ = std::move(waiting);
-  if (scans_without_mount_.size() <= options_.pipeline.max_waiting_scans) return;
+  if (scans_without_mount_.size() <= static_cast<std::size_t>(options_.pipeline.max_waiting_scans)) return;
   refuseScan("its mount is not known: " + mount_problem_);
   scans_without_mount_.pop_front();
 }
@@ -233,23 +233,10 @@ void ScKfOdometryNode::passScansWithMount() {
 void ScKfOdometryNode::account(const ScanReport& report) {
   ++counts_.scans[report.outcome];
   last_scan_ = toString(report.outcome) + (report.reason.empty() ? "" : ": " + report.reason);
-  switch (report.outcome) {
-    case ScanOutcome::kNoOdometry:
-    case ScanOutcome::kOutOfOrder:
-      warnings_.warn("scan", "scan on " + scan_topic_ + " not used: " + last_scan_);
-      return;  // without an estimate
-    case ScanOutcome::kUnusable:
-    case ScanOutcome::kNoMatch:
-    case ScanOutcome::kGated:
-      warnings_.warn("scan", "scan on " + scan_topic_ + " not used: " + last_scan_);
-      break;
-    case ScanOutcome::kReference:
-    case ScanOutcome::kUpdated:
-    case ScanOutcome::kSlip:
-      break;
-  }
-  publisher_.publish(report.estimate);
-  publisher_.publishScan(report);
+  if (!report.reason.empty()) warnings_.warn("scan", "scan on " + scan_topic_ + " not used: " + last_scan_);
+  if (!report.estimate) return;
+  publisher_.publish(*report.estimate);
+  publisher_.publishScan(*report.estimate, report.scan.get());
 }
 
 void ScKfOdometryNode::warnOfSecondParent(const ros::MessageEvent<const tf2_msgs::TFMessage>& event) {

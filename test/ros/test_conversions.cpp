@@ -134,8 +134,8 @@ TEST(Conversions, AnEstimateBecomesOdometryWithItsWholeCovariance) {
   estimate.stamp = Stamp(7000000001);
   estimate.odom_from_base = SE2(1.0, 2.0, 2.5);
   estimate.covariance << 4, 1, 0.5, 1, 3, 0.2, 0.5, 0.2, 2;
-  estimate.twist = {0.5, -0.1, 0.3};
-  estimate.twist_covariance = Eigen::Vector3d(0.1, 0.2, 0.3).asDiagonal();
+  estimate.twist.mean = {0.5, -0.1, 0.3};
+  estimate.twist.covariance = Eigen::Vector3d(0.1, 0.2, 0.3).asDiagonal();
   const nav_msgs::Odometry message = toOdometryMessage(estimate, "odom", "base_link");
   EXPECT_EQ(message.header.frame_id, "odom");
   EXPECT_EQ(message.child_frame_id, "base_link");
@@ -159,7 +159,7 @@ TEST(Conversions, AnEstimateBecomesOdometryWithItsWholeCovariance) {
   const auto back = toOdometrySample(message, nullptr);
   ASSERT_TRUE(back);
   EXPECT_NEAR(error(back->odom_from_base, estimate.odom_from_base).norm(), 0.0, 1e-12);
-  EXPECT_EQ(*back->twist_covariance, estimate.twist_covariance);
+  EXPECT_EQ(*back->twist_covariance, estimate.twist.covariance);
 }
 
 TEST(Conversions, TransformsAndPosesSayTheSame) {

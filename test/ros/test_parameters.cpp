@@ -90,14 +90,14 @@ TEST(Parameters, EveryNameIsThereOnce) {
 
 TEST(Parameters, EachKindOfValueReachesItsField) {
   const Options options = read(
-      "odom_frame: sckf_odom\npublish_tf: no\nkf_dist_linear: 1\ngate_probability: 0.9\nmax_iterations: 7\n"
+      "odom_frame: sckf_odom\npublish_tf: no\nkf_dist_linear: 3\ngate_probability: 0.9\nmax_iterations: 7\n"
       "max_waiting_scans: 3\nmethod: sckf_nc\n");
   EXPECT_EQ(options.node.odom_frame, "sckf_odom");
   EXPECT_FALSE(options.node.publish_tf);
-  EXPECT_EQ(options.pipeline.kf_dist_linear, 1.0);
-  EXPECT_EQ(options.pipeline.gate_probability, 0.9);
+  EXPECT_EQ(options.pipeline.reference.kf_dist_linear, 3.0);
+  EXPECT_EQ(options.pipeline.gate.probability, 0.9);
   EXPECT_EQ(options.pipeline.matcher.max_iterations, 7);
-  EXPECT_EQ(options.pipeline.max_waiting_scans, 3u);
+  EXPECT_EQ(options.pipeline.max_waiting_scans, 3);
   EXPECT_EQ(options.pipeline.method, "sckf_nc");
 }
 
@@ -146,7 +146,7 @@ TEST(Parameters, UnknownNamesAreToldAndChangeNothing) {
   std::vector<std::string> unknown;
   const Options options = read("kf_dist_linaer: 3.0\nscan:\n  range: 1.0\n", &unknown);
   EXPECT_EQ(unknown, (std::vector<std::string>{"kf_dist_linaer", "scan/range"}));
-  EXPECT_EQ(options.pipeline.kf_dist_linear, PipelineOptions().kf_dist_linear);
+  EXPECT_EQ(options.pipeline.reference.kf_dist_linear, ReferenceOptions().kf_dist_linear);
 }
 
 TEST(Parameters, AFileThatCannotBeReadIsNamed) {

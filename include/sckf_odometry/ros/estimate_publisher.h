@@ -19,9 +19,9 @@ class EstimatePublisher {
   /// odometry/filtered and TF, unless something as new has been published: each stamp once, in increasing order.
   void publish(const Estimate& estimate);
 
-  /// pose, at the scan's own stamp, even if the wheels have carried the estimate further already. Its trajectory and
-  /// points go to what publishViews() shows.
-  void publishScan(const ScanReport& report);
+  /// The estimate at a scan: pose, at the scan's own stamp, even if the wheels have carried it further already. It and
+  /// the scan's points, null if it was not usable, go to what publishViews() shows.
+  void publishScan(const Estimate& estimate, const PreparedScan* scan);
 
   /// The wheels alone, drawn from where the estimate began.
   void addWheels(const OdometrySample& sample);
