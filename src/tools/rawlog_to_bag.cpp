@@ -7,7 +7,6 @@
 #include <rosbag/bag.h>
 #include <sensor_msgs/LaserScan.h>
 #include <tf2_msgs/TFMessage.h>
-#include <unistd.h>
 
 #include <boost/make_shared.hpp>
 #include <boost/program_options.hpp>
@@ -24,6 +23,7 @@
 #include <vector>
 
 #include "sckf_odometry/core/se2.h"
+#include "sckf_odometry/tools/progress_bar.h"
 #include "sckf_odometry/tools/rawlog_reader.h"
 
 namespace {
@@ -46,16 +46,6 @@ struct Options {
   std::string laser_frame = "laser";
   double period = 0.1;  ///< [s] between two scans whose log has no usable stamps
 };
-
-/// A line that rewrites itself, on a terminal only.
-void showProgress(size_t done, size_t total) {
-  static const bool is_terminal = isatty(STDERR_FILENO) != 0;
-  if (!is_terminal || (done % 100 != 0 && done != total)) return;
-  constexpr size_t kWidth = 40;
-  const std::string bar(kWidth * done / total, '#');
-  std::fprintf(stderr, "\r[%-*s] %zu of %zu scans%s", static_cast<int>(kWidth), bar.c_str(), done, total,
-               done == total ? "\n" : "");
-}
 
 /// Beams counterclockwise, as ROS users expect, whichever way the laser turns. What is not a reading becomes +Inf.
 sensor_msgs::LaserScan toLaserScan(const RawlogRecord& record, const std::string& frame) {
@@ -133,11 +123,13 @@ void writeBag(const std::vector<RawlogRecord>& records, const Options& options) 
     rosbag::Bag bag(unfinished, rosbag::bagmode::Write);
     const ros::Time start = records.front().stamp;
     bag.write("/tf_static", start, toStaticTransform(records.front(), options), latchedConnection());
-    for (size_t i = 0; i < records.size(); ++i) {
-      bag.write(options.odom_topic, records[i].stamp, toOdometry(records[i], options));
-      bag.write(options.scan_topic, records[i].stamp, toLaserScan(records[i], options.laser_frame));
-      showProgress(i + 1, records.size());
+    sckf::ProgressBar progress(records.size());
+    for (const RawlogRecord& record : records) {
+      bag.write(options.odom_topic, record.stamp, toOdometry(record, options));
+      bag.write(options.scan_topic, record.stamp, toLaserScan(record, options.laser_frame));
+      progress.advance();
     }
+    progress.finish();
     bag.close();
     std::filesystem::rename(unfinished, options.bag);
   } catch (const std::exception& error) {
