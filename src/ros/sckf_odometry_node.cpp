@@ -113,7 +113,7 @@ void ScKfOdometryNode::onOdometry(const nav_msgs::Odometry::ConstPtr& message) {
     if (message->header.stamp.isZero()) return refuseOdometry("header.stamp is 0: the time of the reading expected");
     std::string problem;
     std::optional<OdometrySample> sample = toOdometrySample(*message, &problem);
-    if (sample) sample = inBaseFrame(*sample, frameName(message->child_frame_id), &problem);
+    if (sample) sample = tf_.inBaseFrame(*sample, frameName(message->child_frame_id), &problem);
     if (!sample) return refuseOdometry(problem);
     addOdometry(*sample);
   });
@@ -132,16 +132,6 @@ void ScKfOdometryNode::onTransforms(const ros::MessageEvent<const tf2_msgs::TFMe
 
 void ScKfOdometryNode::onViewTimer(const ros::WallTimerEvent&) {
   guarded([&] { publisher_.publishViews(); });
-}
-
-std::optional<OdometrySample> ScKfOdometryNode::inBaseFrame(const OdometrySample& sample,
-                                                            const std::string& child_frame, std::string* problem) {
-  if (child_frame.empty() || child_frame == options_.node.base_frame) return sample;
-  const auto base_from_child = tf_.baseFrom(child_frame, problem);
-  if (base_from_child) return moved(sample, toPlanar(base_from_child->inverse()));
-  *problem = "child_frame_id is \"" + child_frame + "\", ~base_frame \"" + options_.node.base_frame +
-             "\" expected, or a transform between the two: " + *problem;
-  return std::nullopt;
 }
 
 void ScKfOdometryNode::addOdometry(const OdometrySample& sample) {

@@ -50,6 +50,17 @@ std::optional<Eigen::Isometry3d> TfInput::baseFrom(const std::string& frame, std
   }
 }
 
+std::optional<OdometrySample> TfInput::inBaseFrame(const OdometrySample& sample, const std::string& child_frame,
+                                                   std::string* problem) {
+  if (child_frame.empty()) return sample;
+  if (const auto base_from_child = baseFrom(child_frame, problem)) {
+    return moved(sample, toPlanar(base_from_child->inverse()));
+  }
+  *problem = "child_frame_id is \"" + child_frame + "\", ~base_frame \"" + base_frame_ +
+             "\" expected, or a transform between the two: " + *problem;
+  return std::nullopt;
+}
+
 std::vector<OdometrySample> TfInput::takeOdometry() {
   std::vector<OdometrySample> samples;
   std::size_t taken = 0;  // with those before it: what was older than the rest of the chain never becomes known

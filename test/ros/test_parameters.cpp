@@ -11,6 +11,8 @@
 namespace sckf {
 namespace {
 
+constexpr char kConfigFile[] = "config/sckf_odometry.yaml";  // from the root of the package
+
 /// A parameter file that lives as long as the test.
 class TemporaryFile {
  public:
@@ -68,10 +70,10 @@ TEST(Parameters, TheDefaultsAreAllowed) {
 }
 
 TEST(Parameters, TheConfiguredFileNamesEveryParameterWithItsDefault) {
-  const ParameterFile file(SCKF_CONFIG_FILE);
+  const ParameterFile file(kConfigFile);
   Options defaults;
   for (const Parameter& parameter : parameterList(defaults)) {
-    EXPECT_EQ(file.values().count(parameter.name), 1u) << parameter.name << " is not in " << SCKF_CONFIG_FILE;
+    EXPECT_EQ(file.values().count(parameter.name), 1u) << parameter.name << " is not in " << kConfigFile;
   }
   std::vector<std::string> unknown;
   Options configured = readOptions(file, &unknown);

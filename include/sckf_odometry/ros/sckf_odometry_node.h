@@ -58,10 +58,6 @@ class ScKfOdometryNode {
   template <typename Callback>
   void guarded(const Callback& callback);
 
-  /// The sample, for a driver whose odometry is that of another frame of the robot; empty, with the problem in words,
-  /// while TF does not relate the two.
-  std::optional<OdometrySample> inBaseFrame(const OdometrySample& sample, const std::string& child_frame,
-                                            std::string* problem);
   void addOdometry(const OdometrySample& sample);
   bool isHeldBack(const OdometrySample& sample);
   void restart(const OdometrySample& sample);

@@ -28,6 +28,11 @@ class TfInput {
   /// `problem` says what is missing.
   std::optional<Eigen::Isometry3d> baseFrom(const std::string& frame, std::string* problem);
 
+  /// Odometry of another frame that is fixed to the robot, as that of base_frame. Empty, with the problem in words,
+  /// while TF does not relate the two. An empty child_frame is taken for base_frame: many drivers leave it so.
+  std::optional<OdometrySample> inBaseFrame(const OdometrySample& sample, const std::string& child_frame,
+                                            std::string* problem);
+
   /// The poses of base_frame in the odometry frame since the last call, at the stamps at which a transform of the
   /// odometry frame was published.
   std::vector<OdometrySample> takeOdometry();

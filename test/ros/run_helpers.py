@@ -1,0 +1,164 @@
+"""What the tests of the running nodelet share: recording what it publishes, feeding it, comparing trajectories."""
+
+import math
+import os
+import subprocess
+import threading
+import time
+
+import numpy as np
+import rosgraph
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry, Path
+from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import LaserScan, PointCloud2
+from tf2_msgs.msg import TFMessage
+
+TIMEOUT = 300.0  # [s] of wall time for whatever is waited for: machines can be slow
+PLANE = [0, 1, 5]  # x, y, yaw among the six axes of a pose
+
+
+def planar(pose):
+    """x, y, yaw of a geometry_msgs/Pose in the plane."""
+    q = pose.orientation
+    return np.array([pose.position.x, pose.position.y, math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y**2 + q.z**2))])
+
+
+def wrap(angle):
+    return (angle + math.pi) % (2 * math.pi) - math.pi
+
+
+def wait_until(condition, what, timeout=TIMEOUT):
+    end = time.time() + timeout
+    while not condition():
+        if time.time() > end:
+            raise AssertionError('waited %.0f s in vain for %s' % (timeout, what))
+        time.sleep(0.05)
+
+
+def wait_for_subscriber(topic):
+    """Until somebody subscribes to a topic that nobody need publish yet."""
+    master = rosgraph.Master(rospy.get_name())
+    topic = rospy.resolve_name(topic)
+    wait_until(lambda: topic in [name for name, _ in master.getSystemState()[1]], 'a subscriber to ' + topic)
+
+
+def play(bag, rate, clock=True):
+    """rosbag play, until it ends."""
+    # The queue of the player: at a rate of some hundred it publishes in lumps.
+    command = ['/usr/bin/rosbag', 'play', '--quiet', '--delay=2', '--rate=%g' % rate, '--queue=10000', bag]
+    subprocess.check_call(command + (['--clock'] if clock else []))
+
+
+class Recorder:
+    """Everything that a node of the package publishes below a namespace, and what it says."""
+
+    TOPICS = {
+        'odometry/filtered': Odometry,
+        'pose': PoseWithCovarianceStamped,
+        'path': Path,
+        'path_odometry': Path,
+        'cloud': PointCloud2,
+    }
+
+    def __init__(self, namespace='', node_name='sckf_odometry'):
+        self._lock = threading.Lock()
+        self._messages = {topic: [] for topic in self.TOPICS}
+        self._transforms = []
+        self._log = []
+        self._diagnostics = {}
+        self._node_name = node_name
+        for topic, kind in self.TOPICS.items():
+            rospy.Subscriber(namespace + topic, kind, self._record, topic, queue_size=None, tcp_nodelay=True)
+        rospy.Subscriber('/tf', TFMessage, self._record_transforms, False, queue_size=None)
+        rospy.Subscriber('/tf_static', TFMessage, self._record_transforms, True, queue_size=None)
+        rospy.Subscriber('/rosout', Log, lambda message: self._log.append(message), queue_size=None)
+        rospy.Subscriber('/diagnostics', DiagnosticArray, self._record_diagnostics, queue_size=None)
+
+    def _record(self, message, topic):
+        with self._lock:
+            self._messages[topic].append(message)
+
+    def _record_transforms(self, message, static):
+        with self._lock:
+            self._transforms += [(transform, static) for transform in message.transforms]
+
+    def _record_diagnostics(self, message):
+        for status in message.status:
+            if status.name.startswith(self._node_name + ':'):
+                with self._lock:
+                    self._diagnostics = {entry.key: entry.value for entry in status.values}
+
+    def messages(self, topic):
+        with self._lock:
+            return list(self._messages[topic])
+
+    def transforms(self, static=None):
+        with self._lock:
+            return [t for t, is_static in self._transforms if static is None or is_static == static]
+
+    def diagnostics(self):
+        with self._lock:
+            return dict(self._diagnostics)
+
+    def log(self, part):
+        """Lines of the log that contain this text."""
+        return [message.msg for message in list(self._log) if part in message.msg]
+
+    def newest_stamp(self, topic):
+        messages = self.messages(topic)
+        return messages[-1].header.stamp.to_sec() if messages else 0.0
+
+    def trajectory(self, topic):
+        """Stamps [s], and n × 3 poses."""
+        messages = self.messages(topic)
+        return (np.array([m.header.stamp.to_sec() for m in messages]), np.array([planar(m.pose.pose) for m in messages]))
+
+
+def covariance(message):
+    """3 × 3 of x, y, yaw."""
+    return np.array(message.pose.covariance).reshape(6, 6)[np.ix_(PLANE, PLANE)]
+
+
+def difference(stamps, poses, other_stamps, other_poses):
+    """Largest distance [m] and angle [rad] between two trajectories, the second interpolated at the stamps of the first."""
+    inside = (stamps >= other_stamps[0]) & (stamps <= other_stamps[-1])
+    assert inside.any(), 'no stamp in common'
+    columns = [np.interp(stamps[inside], other_stamps, column) for column in other_poses.T[:2]]
+    columns.append(np.interp(stamps[inside], other_stamps, np.unwrap(other_poses[:, 2])))
+    delta = poses[inside] - np.array(columns).T
+    return np.hypot(delta[:, 0], delta[:, 1]).max(), np.abs(wrap(delta[:, 2])).max()
+
+
+def read_tum(path):
+    """Stamps [s], and n × 3 poses, of a file with lines of: stamp x y z qx qy qz qw."""
+    rows = np.loadtxt(path, ndmin=2)
+    return rows[:, 0], np.column_stack([rows[:, 1], rows[:, 2], 2 * np.arctan2(rows[:, 6], rows[:, 7])])
+
+
+class Feeder:
+    """Publishes messages as a robot would, in the order given, some times faster than their stamps say."""
+
+    def __init__(self, topics):
+        kinds = {'odom': Odometry, 'scan': LaserScan, 'tf_static': TFMessage, 'tf': TFMessage}
+        self._publishers = {
+            topic: rospy.Publisher(topic, kinds[topic.split('/')[-1]], queue_size=None, latch=topic == '/tf_static',
+                                   tcp_nodelay=True)
+            for topic in topics
+        }
+        for topic, publisher in self._publishers.items():
+            wait_until(lambda publisher=publisher: publisher.get_num_connections() > 0, 'a subscriber to ' + topic)
+
+    def feed(self, messages, speed=20.0):
+        begin, first = time.time(), messages[0][2]
+        for topic, message, stamp in messages:
+            time.sleep(max(0.0, begin + (stamp - first) / speed - time.time()))
+            self._publishers[topic].publish(message)
+
+
+def data_file(name):
+    """A recorded log, None where the folder that the environment variable SCKF_DATA names does not have it."""
+    path = os.path.join(os.environ.get('SCKF_DATA', ''), name)
+    return path if os.path.isfile(path) else None
