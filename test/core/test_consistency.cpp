@@ -47,6 +47,15 @@ SE2 motion(const World& world, int increment) {
   return {0.06, 0.0, 0.024 * swing};
 }
 
+OdometryNoise wheelNoise() {
+  OdometryNoise noise;
+  noise.translation_per_meter = 0.05;
+  noise.translation_per_radian = 0.02;
+  noise.yaw_per_meter = 0.05;
+  noise.yaw_per_radian = 0.10;
+  return noise;
+}
+
 struct Experiment {
   World world = kRoom;
   int scans_per_reference = 1;
@@ -85,7 +94,7 @@ void run(const Experiment& experiment, RandomInputs& random, Statistics& sums) {
   for (int scan = 1; scan <= kScans; ++scan) {
     for (int i = 0; i < kIncrementsPerScan; ++i) {
       const SE2 moved = motion(experiment.world, kIncrementsPerScan * scan + i);
-      const Eigen::Matrix3d Q = modelledIncrement(moved, OdometryNoise()).covariance;
+      const Eigen::Matrix3d Q = modelledIncrement(moved, wheelNoise()).covariance;
       filter.propagate({corrected(moved, random.drawnFrom(Q)), Q});
       odom_from_base = compose(odom_from_base, moved);
     }
