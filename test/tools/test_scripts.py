@@ -50,6 +50,14 @@ class ScriptsTest(unittest.TestCase):
             self.assertEqual(done.returncode, 0, done.stdout)
             self.assertIn("usage:", done.stdout)
 
+    def test_python_scripts_run_through_catkins_wrappers(self) -> None:
+        """In the devel space another file executes them, with __file__ set to the script but not the search path."""
+        wrapper = "import sys; path = sys.argv.pop(1); exec(compile(open(path).read(), path, 'exec'), " \
+                  "{'__file__': path, '__name__': '__main__', '__doc__': None})"
+        for path in scripts("/usr/bin/python3"):
+            done = run("/usr/bin/python3", "-B", "-c", wrapper, path, "--help")
+            self.assertEqual(done.returncode, 0, done.stdout)
+
     def test_a_wrong_argument_is_refused_before_anything_is_done(self) -> None:
         for name in ("setup", "test"):
             done = run(ROOT / "scripts" / name, "--nonsense")
