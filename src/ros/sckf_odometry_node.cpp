@@ -13,7 +13,7 @@ namespace sckf {
 namespace {
 
 constexpr char kLogger[] = "sckf_odometry";
-constexpr std::size_t kBackwards = 3;  // so many samples in a row are a jump in time and not a message that came late
+constexpr std::size_t kConfirmations = 3;  // so many stamps in a row are a jump in time and not a wrong stamp
 
 Stamp toDuration(double seconds) { return std::chrono::duration_cast<Stamp>(std::chrono::duration<double>(seconds)); }
 
@@ -153,30 +153,40 @@ void ScKfOdometryNode::addOdometry(const OdometrySample& sample) {
 }
 
 bool ScKfOdometryNode::isHeldBack(const OdometrySample& sample) {
-  if (sample.stamp + toDuration(options_.node.time_jump) >= newest_odometry_) {
-    from_the_past_.clear();
+  const Stamp back = toDuration(options_.node.time_jump);
+  const auto isNear = [back](Stamp stamp, Stamp other) { return stamp + back >= other && stamp <= other + 10 * back; };
+  if (newest_odometry_ == Stamp(0) || isNear(sample.stamp, newest_odometry_)) {
+    held_back_.clear();
     return false;
   }
-  from_the_past_.push_back(sample);
-  if (from_the_past_.size() >= kBackwards) {
-    restart(sample);
+  if (!held_back_.empty() && !isNear(sample.stamp, held_back_.back().stamp)) held_back_.clear();
+  held_back_.push_back(sample);
+  if (held_back_.size() >= kConfirmations) {
+    acceptHeldBack();
   } else {
     std::ostringstream text;
-    text << "its stamp lies " << seconds(newest_odometry_ - sample.stamp) << " s before the newest";
+    text << "its stamp differs by " << seconds(sample.stamp - newest_odometry_) << " s from the newest";
     refuseOdometry(text.str());
   }
   return true;
 }
 
-void ScKfOdometryNode::restart(const OdometrySample& sample) {
-  ROS_WARN_STREAM_NAMED(
-      kLogger, "time went back by " << seconds(newest_odometry_ - sample.stamp) << " s: the estimate starts again");
-  const std::vector<OdometrySample> samples = std::move(from_the_past_);
-  from_the_past_.clear();
-  newest_odometry_ = Stamp(0);
+void ScKfOdometryNode::acceptHeldBack() {
+  const std::vector<OdometrySample> samples = std::move(held_back_);
+  held_back_.clear();
+  const double jump = seconds(samples.front().stamp - newest_odometry_);
+  newest_odometry_ = samples.front().stamp;
+  if (jump < 0.0) {
+    ROS_WARN_STREAM_NAMED(kLogger, "time went back by " << -jump << " s: the estimate starts again");
+    restart();
+  }
+  for (const OdometrySample& sample : samples) addOdometry(sample);
+}
+
+void ScKfOdometryNode::restart() {
   pipeline_ = std::make_unique<ScanOdometry>(options_.pipeline);
   publisher_.restart();
-  for (const OdometrySample& held : samples) addOdometry(held);
+  if (!options_.node.use_tf_odometry) tf_.clear();  // there it has noticed by itself, and has begun anew already
 }
 
 void ScKfOdometryNode::refuseScan(const std::string& reason) {

@@ -24,12 +24,16 @@ void TfInput::add(const tf2_msgs::TFMessage& message, bool is_static) {
   }
 }
 
+void TfInput::clear() {
+  buffer_.clear();
+  odometry_stamps_.clear();
+  newest_odometry_ = ros::Time();
+}
+
 void TfInput::noteOdometryStamp(const ros::Time& stamp) {
   if (toStamp(stamp) + time_jump_ < toStamp(newest_odometry_)) {
     if (++backwards_ < kBackwards) return;
-    buffer_.clear();  // it would refuse what is older than its memory, and mix up the rest
-    odometry_stamps_.clear();
-    newest_odometry_ = stamp;
+    clear();
   }
   backwards_ = 0;
   newest_odometry_ = std::max(newest_odometry_, stamp);

@@ -38,8 +38,8 @@ def walls():
 class Mount:
     """Pose of the laser in base_link: translation, then rotation about z, then half a turn about x if upside down."""
 
-    def __init__(self, x=0.0, y=0.0, z=0.3, yaw=0.0, upside_down=False):
-        self.x, self.y, self.z, self.yaw, self.upside_down = x, y, z, yaw, upside_down
+    def __init__(self, x=0.0, y=0.0, z=0.3, yaw=0.0, upside_down=False, frame='laser'):
+        self.x, self.y, self.z, self.yaw, self.upside_down, self.frame = x, y, z, yaw, upside_down, frame
 
     def bearings(self, angles):
         """Directions in base_link of beams at these angles in the laser's plane."""
@@ -114,7 +114,7 @@ def odometry_message(stamp, pose):
 def scan_message(stamp, pose, mount, segments, rng, beams=360, noise=0.01):
     message = LaserScan()
     message.header.stamp = stamp
-    message.header.frame_id = 'laser'
+    message.header.frame_id = mount.frame
     message.angle_min = -math.pi
     message.angle_increment = 2 * math.pi / beams
     message.angle_max = message.angle_min + (beams - 1) * message.angle_increment
@@ -129,7 +129,7 @@ def scan_message(stamp, pose, mount, segments, rng, beams=360, noise=0.01):
 def mount_message(stamp, mount):
     transform = TransformStamped()
     transform.header.stamp = stamp
-    transform.header.frame_id, transform.child_frame_id = 'base_link', 'laser'
+    transform.header.frame_id, transform.child_frame_id = 'base_link', mount.frame
     t, r = transform.transform.translation, transform.transform.rotation
     t.x, t.y, t.z = mount.x, mount.y, mount.z
     r.x, r.y, r.z, r.w = mount.quaternion()

@@ -3,7 +3,6 @@
 
 import os
 import subprocess
-import sys
 import tempfile
 import unittest
 
@@ -11,8 +10,8 @@ import numpy as np
 import rosbag
 import roslib.packages
 import rospy
-import rostest
 
+import junit_runner
 import run_helpers as helpers
 import simulated_bag
 
@@ -54,7 +53,6 @@ class ReplayNodelet(unittest.TestCase):
         cls.folder = tempfile.TemporaryDirectory()
         cls.bag, missing = make_bag(rospy.get_param('~bag'), cls.folder.name)
         if missing:
-            print('SKIPPED: ' + missing)
             raise unittest.SkipTest(missing)
         cls.wheels = wheels_of(cls.bag)
         with rosbag.Bag(cls.bag) as log:
@@ -173,4 +171,4 @@ class ReplayNodelet(unittest.TestCase):
 
 if __name__ == '__main__':
     rospy.init_node('test_replay_nodelet')
-    rostest.rosrun('sckf_odometry', 'replay_' + rospy.get_param('~bag'), ReplayNodelet, sys.argv)
+    junit_runner.run(ReplayNodelet)

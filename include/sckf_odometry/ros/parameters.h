@@ -20,7 +20,7 @@ struct NodeOptions {
   bool use_tf_odometry = false;  ///< read wheel odometry from TF instead of the topic odom
   std::string tf_odometry_frame = "odom";  ///< frame of the wheel odometry on TF
   std::size_t queue_size = 2000;           ///< messages per subscription that may wait
-  double time_jump = 1.0;                  ///< [s] odometry that goes back by more than this starts a new estimate
+  double time_jump = 1.0;                  ///< [s] odometry that goes back by more starts a new estimate
   double visualization_rate = 2.0;         ///< [1/s] of wall time, at which paths and cloud are published
   double path_distance = 0.05;             ///< [m] between two poses of a path
   std::size_t path_max_poses = 10000;      ///< a path that grows longer is thinned to half

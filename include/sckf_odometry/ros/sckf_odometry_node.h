@@ -59,8 +59,11 @@ class ScKfOdometryNode {
   void guarded(const Callback& callback);
 
   void addOdometry(const OdometrySample& sample);
+  /// Whether the sample's stamp is so far from the others that the next ones have to tell whether time has jumped or
+  /// one stamp is wrong.
   bool isHeldBack(const OdometrySample& sample);
-  void restart(const OdometrySample& sample);
+  void acceptHeldBack();
+  void restart();
   void refuseScan(const std::string& reason);
   void refuseOdometry(const std::string& reason);
 
@@ -79,7 +82,7 @@ class ScKfOdometryNode {
   Warnings warnings_;
   Counts counts_;
   std::deque<sensor_msgs::LaserScan::ConstPtr> scans_without_mount_;
-  std::vector<OdometrySample> from_the_past_;  // odometry in a row that lies far before the newest
+  std::vector<OdometrySample> held_back_;
   Stamp newest_odometry_{0};
   std::string mount_problem_;  // of the newest scan that waits for its mount
   std::string last_scan_;      // what became of it

@@ -24,6 +24,9 @@ class TfInput {
 
   void add(const tf2_msgs::TFMessage& message, bool is_static);
 
+  /// Forgets all but what is fixed: time begins again, and it would refuse what is older than what it has.
+  void clear();
+
   /// Pose of a frame that is fixed to the robot, in base_frame, looked up once. Empty while TF does not tell; then
   /// `problem` says what is missing.
   std::optional<Eigen::Isometry3d> baseFrom(const std::string& frame, std::string* problem);
