@@ -78,7 +78,8 @@ void AlignmentProblem::addPointPair(const Pair& pair, const PairOptions& options
   const Eigen::Vector2d along = step.normalized();
   const Eigen::Vector2d& anchor = reference_.points.point[i];
   pairs_.push_back(pair);
-  residuals_.push_back({pair.reference, pair.current, quarterTurn(along), anchor, nullptr, std::sqrt(variance)});
+  residuals_.push_back({pair.reference, pair.current, quarterTurn(along), anchor, nullptr,
+                        std::sqrt(variance + 0.06 * step.squaredNorm())});
   residuals_.push_back(
       {pair.reference, pair.current, along, anchor, nullptr, std::sqrt(variance + step.squaredNorm())});
 }
@@ -113,15 +114,29 @@ ResidualTerms AlignmentProblem::terms(const Residual& residual, const SE2& refer
   return terms;
 }
 
-AlignmentProblem::NormalEquations AlignmentProblem::normalEquations(const SE2& reference_from_current) const {
+NormalEquations AlignmentProblem::normalEquations(const SE2& reference_from_current) const {
   NormalEquations equations;
+  double lever_square_sum = 0.0;
   for (const Residual& residual : residuals_) {
     const ResidualTerms t = terms(residual, reference_from_current);
     const double w = kernel_.weight(t.e) / (scale_ * scale_);
     equations.information += w * t.A * t.A.transpose();
     equations.gradient += w * t.e * t.A;
+    lever_square_sum += t.lever.squaredNorm();
+    if (residual.surface == nullptr) continue;
+    const Eigen::Vector3d dA = derivativeByNormal(residual, t);
+    const double angle_variance = square(reference_.range_noise) / residual.surface->spread;
+    equations.spurious += w * angle_variance * dA * dA.transpose();
   }
+  equations.lever = std::sqrt(lever_square_sum / static_cast<double>(residuals_.size()));
   return equations;
+}
+
+Eigen::Vector3d AlignmentProblem::derivativeByNormal(const Residual& residual, const ResidualTerms& t) {
+  const Eigen::Vector2d tangent = quarterTurn(residual.normal);
+  Eigen::Vector3d dA;
+  dA << tangent, tangent.dot(quarterTurn(t.lever));
+  return dA / residual.std;
 }
 
 double AlignmentProblem::cost(const SE2& reference_from_current) const {

@@ -5,65 +5,13 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 namespace sckf {
 
 namespace {
 
-using Matrix3D = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3>;
 using MatrixDD = Displacement::MatrixDD;
 using MatrixD3 = Displacement::MatrixD3;
-
-/// The directions that the scans see, V_o of the paper (VII-A.2): (x, y, yaw) = start + basis · y, y = coordinates · …
-struct ObservableDirections {
-  Matrix3D basis;        // 3 × d
-  MatrixD3 coordinates;  // d × 3, with coordinates · basis = I
-
-  Eigen::Index dimension() const { return basis.cols(); }
-};
-
-/// Eigenvectors of the information, yaw scaled by the mean lever so that all are in metres. Noise of the normals alone
-/// makes information where there is none: along a corridor, E{δA δAᵀ} of normals that err by σ²/spread. It counts as
-/// spurious, and a direction must have clearly more than that.
-ObservableDirections observableDirections(const AlignmentProblem& problem, const SE2& x,
-                                          const EstimationOptions& options) {
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-  Eigen::Matrix3d spurious = Eigen::Matrix3d::Zero();
-  double lever_square_sum = 0.0;
-  for (const Residual& residual : problem.residuals()) {
-    const ResidualTerms t = problem.terms(residual, x);
-    const double w = problem.kernel().weight(t.e) / (problem.scale() * problem.scale());
-    information += w * t.A * t.A.transpose();
-    lever_square_sum += t.lever.squaredNorm();
-    if (residual.surface == nullptr) continue;
-    const Eigen::Vector2d tangent = residual.surface->tangent();
-    Eigen::Vector3d dA;  // ∂A by the angle of the normal
-    dA << tangent, tangent.dot(quarterTurn(t.lever));
-    const double angle_std = problem.reference().range_noise / std::sqrt(residual.surface->spread) / residual.std;
-    spurious += w * angle_std * angle_std * dA * dA.transpose();
-  }
-  const double lever = std::sqrt(lever_square_sum / static_cast<double>(problem.residuals().size()));
-  const Eigen::Vector3d unit(1.0, 1.0, 1.0 / lever);
-  const Eigen::Matrix3d scaled = unit.asDiagonal() * information * unit.asDiagonal();
-  const Eigen::Matrix3d scaled_spurious = unit.asDiagonal() * spurious * unit.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scaled);
-  std::vector<int> seen;
-  for (int k = 0; k < 3; ++k) {
-    const Eigen::Vector3d v = eigen.eigenvectors().col(k);
-    const double noise = v.dot(scaled_spurious * v);
-    const double signal = eigen.eigenvalues()(k) - noise;
-    const bool known = signal * options.max_std * options.max_std > 1.0;
-    if (known && eigen.eigenvalues()(k) > options.min_information_ratio * noise) seen.push_back(k);
-  }
-  ObservableDirections directions{Matrix3D(3, seen.size()), MatrixD3(seen.size(), 3)};
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    const Eigen::Vector3d v = eigen.eigenvectors().col(seen[i]);
-    directions.basis.col(static_cast<Eigen::Index>(i)) = unit.cwiseProduct(v);
-    directions.coordinates.row(static_cast<Eigen::Index>(i)) = v.cwiseQuotient(unit).transpose();
-  }
-  return directions;
-}
 
 /// Minimises the robust loss in the seen directions, pairs and weights fixed.
 SE2 minimise(const AlignmentProblem& problem, SE2 x, const ObservableDirections& seen) {
@@ -101,10 +49,7 @@ void addSurfaceDerivatives(const AlignmentProblem& problem, const Residual& resi
   const Eigen::Vector2d& n = surface.normal;
   const Eigen::Vector2d tangent = surface.tangent();
   const double along = tangent.dot(t.offset);
-  Eigen::Vector3d dA;  // ∂A by the angle of the normal
-  dA << tangent, tangent.dot(quarterTurn(t.lever));
-  dA /= residual.std;
-  const Eigen::Vector3d by_angle = problem.kernel().influence(t.e) * dA;
+  const Eigen::Vector3d by_angle = problem.kernel().influence(t.e) * AlignmentProblem::derivativeByNormal(residual, t);
   const Eigen::Vector3d by_residual = problem.kernel().slope(t.e) / residual.std * t.A;
   for (int j = surface.first; j <= surface.last; ++j) {
     const auto k = static_cast<std::size_t>(j);
@@ -179,7 +124,7 @@ MatrixDD matchingNoise(const MatrixDD& range_covariance, const MatrixDD& seen_co
 
 std::optional<DisplacementEstimate> estimateDisplacement(const AlignmentProblem& problem, const SE2& start,
                                                          const EstimationOptions& options) {
-  const ObservableDirections seen = observableDirections(problem, start, options);
+  const ObservableDirections seen = observableDirections(problem.normalEquations(start), options.observability);
   if (seen.dimension() == 0) return std::nullopt;
   const SE2 x = minimise(problem, start, seen);
   const LossDerivatives loss = differentiate(problem, x, options);

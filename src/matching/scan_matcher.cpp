@@ -75,10 +75,7 @@ class Search {
     for (int i = 0; i < options_.max_iterations; ++i) {
       const AlignmentProblem problem(reference_, current_, x, distance, options_.pairs);
       if (tooFew(problem)) return std::nullopt;
-      const auto equations = problem.normalEquations(x);
-      const Eigen::Matrix3d information = equations.information + prior_information_;
-      const Eigen::Vector3d gradient = equations.gradient + prior_information_ * error(x, mean_);
-      const Eigen::Vector3d step = -information.ldlt().solve(gradient);
+      const Eigen::Vector3d step = mapStep(problem.normalEquations(x), x);
       x = corrected(x, step);
       const bool settled = step.cwiseAbs().maxCoeff() < kSettled;
       if (settled && distance <= options_.pairs.max_distance) break;
@@ -90,6 +87,18 @@ class Search {
     const double surprise = e.dot(prior_information_ * e);
     const double cost = problem.cost(x) + 0.5 * surprise;
     return Alignment{x, cost, surprise, std::move(problem)};
+  }
+
+  /// A step towards the maximum of the posterior, in which the scans have a say where they see and the prior elsewhere.
+  Eigen::Vector3d mapStep(const NormalEquations& equations, const SE2& x) const {
+    const ObservableDirections seen = observableDirections(equations, options_.estimation.observability);
+    const auto& B = seen.basis;
+    const auto& C = seen.coordinates;
+    const Eigen::Matrix3d information =
+        C.transpose() * (B.transpose() * equations.information * B) * C + prior_information_;
+    const Eigen::Vector3d gradient =
+        C.transpose() * (B.transpose() * equations.gradient) + prior_information_ * error(x, mean_);
+    return -information.ldlt().solve(gradient);
   }
 
   bool tooFew(const AlignmentProblem& problem) const {

@@ -55,16 +55,23 @@ bool connected(const ScannedPoints& points, std::size_t i, double range_noise, d
   return (points.point[i + 1] - points.point[i]).norm() <= reach + 3.0 * range_noise;
 }
 
-/// The longest stretch around point i, within [begin, end], that is straight within the noise.
+/// The longest stretch around point i, within [begin, end], that is straight within the noise. Noise makes a short
+/// stretch look bent now and then: one that is not straight ends the search only if the next longer one is not either.
 Surface growSurface(const ScannedPoints& points, const Moments& moments, int i, int begin, int end, double range_noise,
                     const SurfaceOptions& options) {
   Surface longest;
+  bool bent = false;
   for (const int half : {2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64}) {
     const int first = std::max(begin, i - half);
     const int last = std::min(end, i + half);
     if (last - first < 3) continue;
     const Moments::Fit candidate = moments.fit(first, last);
-    if (candidate.scatter > options.straightness * range_noise) break;
+    if (candidate.scatter > options.straightness * range_noise) {
+      if (bent) break;
+      bent = true;
+      continue;
+    }
+    bent = false;
     longest = candidate.surface;
     const Eigen::Vector2d& a = points.point[static_cast<std::size_t>(first)];
     const Eigen::Vector2d& b = points.point[static_cast<std::size_t>(last)];

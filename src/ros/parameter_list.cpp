@@ -106,8 +106,8 @@ List matcherParameters(MatcherOptions& matcher) {
       number("surface_roughness", pairs.surface_roughness, atLeast(0.0), "m"),
       number("point_std", pairs.point_std, above(0.0), "m"),
       number("robust_width", pairs.robust_width, above(0.0)),
-      number("observable_max_std", estimation.max_std, above(0.0), "m"),
-      number("observable_min_information_ratio", estimation.min_information_ratio, atLeast(0.0)),
+      number("observable_max_std", estimation.observability.max_std, above(0.0), "m"),
+      number("observable_min_information_ratio", estimation.observability.min_information_ratio, atLeast(0.0)),
       number("correlated_beams", estimation.correlated_beams, within(1, 10000), "beams"),
   };
 }

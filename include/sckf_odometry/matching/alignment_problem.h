@@ -57,6 +57,14 @@ struct ResidualTerms {
   Eigen::Vector3d A;       ///< ∂e/∂(x, y, yaw)
 };
 
+/// The problem linearised at a displacement, its robust weights divided by the square of its scale.
+struct NormalEquations {
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< Σ Aᵀ w A
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();     ///< Σ Aᵀ w e
+  Eigen::Matrix3d spurious = Eigen::Matrix3d::Zero();     ///< the information that noise of the normals alone makes
+  double lever = 0.0;                                     ///< rms distance of the points from base_link [m]
+};
+
 class AlignmentProblem {
  public:
   /// Pairs the points at the displacement, at most max_distance [m] apart, and weighs the pairs. Both scans must
@@ -78,10 +86,9 @@ class AlignmentProblem {
 
   ResidualTerms terms(const Residual& residual, const SE2& reference_from_current) const;
 
-  struct NormalEquations {
-    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< Σ Aᵀ w A
-    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();     ///< Σ Aᵀ w e
-  };
+  /// ∂A by the angle of the residual's normal.
+  static Eigen::Vector3d derivativeByNormal(const Residual& residual, const ResidualTerms& terms);
+
   NormalEquations normalEquations(const SE2& reference_from_current) const;
 
   /// Loss of the whole current scan, a point without a partner at a fixed price: compares alignments with each other.

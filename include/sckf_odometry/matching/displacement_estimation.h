@@ -5,13 +5,13 @@
 
 #include "sckf_odometry/core/displacement.h"
 #include "sckf_odometry/matching/alignment_problem.h"
+#include "sckf_odometry/matching/observability.h"
 
 namespace sckf {
 
 struct EstimationOptions {
-  double max_std = 0.2;                ///< [m] a direction that the scans tell worse is unobserved
-  double min_information_ratio = 5.0;  ///< … as is one whose information is less than this many times the spurious one
-  int correlated_beams = 10;           ///< residuals of this many neighbouring beams may err together
+  ObservabilityOptions observability;
+  int correlated_beams = 10;  ///< residuals of this many neighbouring beams may err together
 };
 
 struct DisplacementEstimate {

@@ -1,0 +1,193 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "matching/simulated_world.h"
+#include "sckf_odometry/matching/prepared_scan.h"
+
+namespace sckf::test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+const Eigen::Isometry3d kAtBase = Eigen::Isometry3d::Identity();
+
+/// A flat wall 2 m ahead, seen by 91 beams.
+LaserScan wallAhead() {
+  LaserScan scan;
+  scan.angle_min = -M_PI / 4.0;
+  scan.angle_increment = M_PI / 180.0;
+  scan.range_min = 0.1;
+  scan.range_max = 10.0;
+  for (int i = 0; i <= 90; ++i) scan.ranges.push_back(static_cast<float>(2.0 / std::cos((i - 45) * M_PI / 180.0)));
+  return scan;
+}
+
+std::string rejectionOf(const LaserScan& scan, const Eigen::Isometry3d& mount = kAtBase) {
+  std::string rejection;
+  EXPECT_EQ(prepareScan(scan, mount, ScanOptions(), &rejection), nullptr);
+  return rejection;
+}
+
+TEST(PreparedScan, KeepsEveryReadingOfAGoodScan) {
+  const auto scan = prepareScan(wallAhead(), kAtBase, ScanOptions());
+  ASSERT_NE(scan, nullptr);
+  EXPECT_EQ(scan->beams, 91U);
+  ASSERT_EQ(scan->size(), 91U);
+  EXPECT_EQ(scan->map.size(), 91U);
+  for (const Eigen::Vector2d& p : scan->points.point) EXPECT_NEAR(p.x(), 2.0, 1e-6);
+}
+
+TEST(PreparedScan, LeavesOutWhatIsNoReading) {
+  LaserScan scan = wallAhead();
+  scan.ranges[3] = std::numeric_limits<float>::quiet_NaN();
+  scan.ranges[4] = std::numeric_limits<float>::infinity();   // nothing in range (REP-117)
+  scan.ranges[5] = -std::numeric_limits<float>::infinity();  // too near (REP-117)
+  scan.ranges[6] = 0.0F;
+  scan.ranges[7] = 0.09F;   // below range_min
+  scan.ranges[8] = 10.01F;  // above range_max
+  scan.ranges[9] = -1.0F;
+  const auto prepared = prepareScan(scan, kAtBase, ScanOptions());
+  ASSERT_NE(prepared, nullptr);
+  EXPECT_EQ(prepared->beams, 91U);
+  ASSERT_EQ(prepared->size(), 84U);
+  EXPECT_EQ(prepared->points.beam[2], 2);
+  EXPECT_EQ(prepared->points.beam[3], 10);
+}
+
+TEST(PreparedScan, ItsOwnLimitsOfRangeHoldBesideTheScans) {
+  ScanOptions options;
+  options.range_max = 2.5;
+  const auto prepared = prepareScan(wallAhead(), kAtBase, options);
+  ASSERT_NE(prepared, nullptr);
+  for (const double range : prepared->points.range) EXPECT_LE(range, 2.5);
+  EXPECT_LT(prepared->size(), 91U);
+}
+
+TEST(PreparedScan, SaysWhatIsWrongWithABadScan) {
+  LaserScan empty = wallAhead();
+  empty.ranges.clear();
+  EXPECT_THAT(rejectionOf(empty), HasSubstr("0 of 0 ranges"));
+
+  LaserScan blind = wallAhead();
+  for (float& range : blind.ranges) range = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THAT(rejectionOf(blind), HasSubstr("0 of 91 ranges are finite and within [0.1, 10] m: expected at least 20"));
+
+  LaserScan still = wallAhead();
+  still.angle_increment = 0.0;
+  EXPECT_THAT(rejectionOf(still), HasSubstr("angle_increment 0"));
+
+  LaserScan nowhere = wallAhead();
+  nowhere.angle_min = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(rejectionOf(nowhere), HasSubstr("angle_min is nan"));
+
+  Eigen::Isometry3d tilted = kAtBase;
+  tilted.rotate(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitY()));
+  EXPECT_THAT(rejectionOf(wallAhead(), tilted), HasSubstr("tilted"));
+}
+
+TEST(PreparedScan, TheMountTakesPointsToTheBase) {
+  // Upside down, looking back and 0.3 m behind: beam 0, which looks to the right of the laser, looks to the right of
+  // the robot's back as seen along it, and the wall is 2.3 m behind the base.
+  Eigen::Isometry3d mount = Eigen::Isometry3d::Identity();
+  mount.translation().x() = -0.3;
+  mount.rotate(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitY()));
+  const auto prepared = prepareScan(wallAhead(), mount, ScanOptions());
+  ASSERT_NE(prepared, nullptr);
+  for (const Eigen::Vector2d& p : prepared->points.point) EXPECT_NEAR(p.x(), -2.3, 1e-6);
+  EXPECT_NEAR(prepared->points.point.front().y(), -2.0, 1e-5);
+  EXPECT_NEAR(prepared->points.point.back().y(), 2.0, 1e-5);
+}
+
+TEST(PreparedScan, EstimatesTheNoiseOfItsRanges) {
+  std::mt19937_64 random(1);
+  for (const double noise : {0.02, 0.05}) {
+    SimulatedLaser laser;
+    laser.noise = noise;
+    double sum = 0.0;
+    for (int i = 0; i < 20; ++i) {
+      const auto scan = prepareScan(simulateScan(room(), SE2(), laser, &random), kAtBase, ScanOptions());
+      ASSERT_NE(scan, nullptr);
+      sum += scan->range_noise;
+    }
+    EXPECT_NEAR(sum / 20.0, noise, 0.1 * noise);
+  }
+}
+
+TEST(PreparedScan, BelievesNoScanToBeBetterOrWorseThanItsLimits) {
+  ScanOptions options;
+  const auto perfect = prepareScan(wallAhead(), kAtBase, options);
+  ASSERT_NE(perfect, nullptr);
+  EXPECT_DOUBLE_EQ(perfect->range_noise, options.range_noise_min);
+  EXPECT_DOUBLE_EQ(perfect->rangeVariances()(5), options.range_noise_min * options.range_noise_min);
+  EXPECT_EQ(perfect->rangeVariances().size(), 91);
+
+  std::mt19937_64 random(2);
+  SimulatedLaser wild;
+  wild.noise = 0.5;
+  const auto noisy = prepareScan(simulateScan(room(), SE2(), wild, &random), kAtBase, options);
+  ASSERT_NE(noisy, nullptr);
+  EXPECT_DOUBLE_EQ(noisy->range_noise, options.range_noise_max);
+}
+
+TEST(Surfaces, HaveTheNormalOfTheWallTowardsTheLaser) {
+  const auto scan = prepareScan(wallAhead(), kAtBase, ScanOptions());
+  ASSERT_NE(scan, nullptr);
+  for (const Surface& surface : scan->surface) {
+    ASSERT_TRUE(surface.valid());
+    EXPECT_NEAR(surface.normal.x(), -1.0, 1e-6);
+    EXPECT_NEAR(surface.normal.y(), 0.0, 1e-6);
+    EXPECT_NEAR(surface.centroid.x(), 2.0, 1e-6);
+  }
+}
+
+TEST(Surfaces, NormalsOfNoisyDenseScansAreKnownAsWellAsTheyClaim) {
+  std::mt19937_64 random(3);
+  SimulatedLaser laser;
+  laser.beams = 720;
+  laser.angle_increment = M_PI / 360.0;
+  laser.noise = 0.05;
+  const World hall = closedPolygon({{-4.0, -4.0}, {4.0, -4.0}, {4.0, 4.0}, {-4.0, 4.0}});
+  const ScanOptions options;
+  double normalised_square = 0.0;
+  int count = 0;
+  for (int run = 0; run < 20; ++run) {
+    const auto scan = prepareScan(simulateScan(hall, SE2(), laser, &random), kAtBase, options);
+    ASSERT_NE(scan, nullptr);
+    for (std::size_t i = 0; i < scan->size(); i += 20) {
+      const Surface& surface = scan->surface[i];
+      const Eigen::Vector2d& p = scan->points.point[i];
+      const bool mid_wall = std::min(std::abs(p.x()), std::abs(p.y())) < 2.0;
+      if (!surface.valid() || !mid_wall) continue;
+      const Eigen::Vector2d truth = std::abs(p.x()) > std::abs(p.y())
+                                        ? Eigen::Vector2d(-std::copysign(1.0, p.x()), 0.0)
+                                        : Eigen::Vector2d(0.0, -std::copysign(1.0, p.y()));
+      const double angle = std::asin(truth.x() * surface.normal.y() - truth.y() * surface.normal.x());
+      const double angle_std = scan->range_noise / std::sqrt(surface.spread);
+      EXPECT_LT(angle_std, options.surface.max_normal_std);
+      normalised_square += angle * angle / (angle_std * angle_std);
+      ++count;
+    }
+  }
+  ASSERT_GT(count, 200);
+  // Rays that graze the wall turn range noise into less noise across it, so the claim is on the safe side.
+  EXPECT_LT(normalised_square / count, 1.5);
+  EXPECT_GT(normalised_square / count, 0.3);
+}
+
+TEST(Surfaces, DoNotReachAcrossADepthDiscontinuity) {
+  LaserScan scan = wallAhead();
+  for (std::size_t i = 45; i < scan.ranges.size(); ++i) scan.ranges[i] *= 2.0F;  // the wall behind is 4 m away
+  const auto prepared = prepareScan(scan, kAtBase, ScanOptions());
+  ASSERT_NE(prepared, nullptr);
+  for (std::size_t i = 0; i < prepared->size(); ++i) {
+    const Surface& surface = prepared->surface[i];
+    if (!surface.valid()) continue;
+    EXPECT_NEAR(surface.centroid.x(), i < 45 ? 2.0 : 4.0, 1e-5) << "point " << i;
+  }
+}
+
+}  // namespace
+}  // namespace sckf::test

@@ -1,0 +1,316 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <limits>
+
+#include "matching/simulated_world.h"
+#include "sckf_odometry/matching/scan_matcher.h"
+
+namespace sckf::test {
+namespace {
+
+using PreparedScanPtr = std::shared_ptr<const PreparedScan>;
+
+PreparedScanPtr prepare(const LaserScan& scan, const SimulatedLaser& laser, const ScanOptions& options = {}) {
+  const auto prepared = prepareScan(scan, laser.base_from_laser, options);
+  EXPECT_NE(prepared, nullptr);
+  return prepared;
+}
+
+/// A prediction with an error and a covariance that allows for it.
+DisplacementPrediction prediction(const SE2& truth, const Eigen::Vector3d& offset = {0.05, -0.04, 0.03}) {
+  return {corrected(truth, offset), Eigen::Vector3d(0.1, 0.1, 0.1).cwiseAbs2().asDiagonal()};
+}
+
+Match matchIn(const World& world, const SE2& world_from_reference, const SE2& displacement, const SimulatedLaser& laser,
+              const DisplacementPrediction& expected, std::mt19937_64* random = nullptr) {
+  const auto reference = prepare(simulateScan(world, world_from_reference, laser, random), laser);
+  const auto current = prepare(simulateScan(world, compose(world_from_reference, displacement), laser, random), laser);
+  return ScanMatcher(MatcherOptions()).match(*reference, *current, expected);
+}
+
+const SE2 kDisplacement(0.4, -0.1, 0.2);
+
+TEST(ScanMatcher, FindsTheDisplacementInARoom) {
+  const Match match = matchIn(room(), SE2(), kDisplacement, SimulatedLaser(), prediction(kDisplacement));
+  ASSERT_TRUE(match.displacement) << toString(match.failure);
+  EXPECT_EQ(match.displacement->dimension(), 3);
+  EXPECT_GT(match.overlap, 0.8);
+  const Eigen::Vector3d e = error(match.displacement->reference_from_current, kDisplacement);
+  EXPECT_LT(e.cwiseAbs().maxCoeff(), 2e-3) << "error " << e.transpose();
+}
+
+TEST(ScanMatcher, ThePredictionDoesNotEnterWhatTheScansSee) {
+  const Match a = matchIn(room(), SE2(), kDisplacement, SimulatedLaser(), prediction(kDisplacement));
+  const Match b =
+      matchIn(room(), SE2(), kDisplacement, SimulatedLaser(), prediction(kDisplacement, {-0.08, 0.06, -0.05}));
+  ASSERT_TRUE(a.displacement && b.displacement);
+  const Eigen::Vector3d difference =
+      error(a.displacement->reference_from_current, b.displacement->reference_from_current);
+  EXPECT_LT(difference.cwiseAbs().maxCoeff(), 1e-3) << "difference " << difference.transpose();
+}
+
+TEST(ScanMatcher, FindsAYawThatTheWheelsMissed) {
+  const Match match = matchIn(room(), SE2(), SE2(0.1, 0.0, 0.45), SimulatedLaser(), prediction(SE2(0.1, 0.0, 0.1)));
+  ASSERT_TRUE(match.displacement) << toString(match.failure);
+  EXPECT_NEAR(match.displacement->reference_from_current.yaw, 0.45, 2e-3);
+}
+
+TEST(ScanMatcher, AMountAheadGivesTheDisplacementOfTheBase) {
+  SimulatedLaser laser;
+  laser.base_from_laser.translation() << 0.5, 0.1, 0.3;
+  laser.base_from_laser.rotate(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()));  // upside down
+  const Match match = matchIn(room(), SE2(), kDisplacement, laser, prediction(kDisplacement));
+  ASSERT_TRUE(match.displacement) << toString(match.failure);
+  const Eigen::Vector3d e = error(match.displacement->reference_from_current, kDisplacement);
+  EXPECT_LT(e.cwiseAbs().maxCoeff(), 2e-3) << "error " << e.transpose();
+}
+
+TEST(ScanMatcher, ScansMayHaveDifferentNumbersOfBeams) {
+  SimulatedLaser coarse;
+  coarse.beams = 181;
+  coarse.angle_increment = 2.0 * M_PI / 181.0;
+  const SimulatedLaser fine;
+  const auto reference = prepare(simulateScan(room(), SE2(), coarse), coarse);
+  const auto current = prepare(simulateScan(room(), kDisplacement, fine), fine);
+  const Match match = ScanMatcher(MatcherOptions()).match(*reference, *current, prediction(kDisplacement));
+  ASSERT_TRUE(match.displacement) << toString(match.failure);
+  EXPECT_EQ(match.displacement->J_reference.cols(), 181);
+  EXPECT_EQ(match.displacement->variance_reference.size(), 181);
+  EXPECT_EQ(match.displacement->J_current.cols(), 361);
+  EXPECT_EQ(match.displacement->variance_current.size(), 361);
+  const Eigen::Vector3d e = error(match.displacement->reference_from_current, kDisplacement);
+  EXPECT_LT(e.cwiseAbs().maxCoeff(), 5e-3) << "error " << e.transpose();
+}
+
+/// The Jacobian by central differences of the whole matcher: one range changed, everything done again.
+class Jacobians : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::mt19937_64 random(11);
+    laser_.noise = 0.01;
+    reference_ = simulateScan(room(), SE2(), laser_, &random);
+    current_ = simulateScan(room(), kDisplacement, laser_, &random);
+    // What is estimated from the scan as a whole is held: the derivative is by the ranges at a given noise.
+    options_.range_noise_min = options_.range_noise_max = 0.01;
+  }
+
+  Match match(const LaserScan& reference, const LaserScan& current) const {
+    return ScanMatcher(MatcherOptions())
+        .match(*prepare(reference, laser_, options_), *prepare(current, laser_, options_), prediction(kDisplacement));
+  }
+
+  Eigen::Vector3d numericalColumn(bool of_reference, std::size_t beam) const {
+    const float h = 1e-4F;
+    const auto at = [&](float change) {
+      LaserScan reference = reference_;
+      LaserScan current = current_;
+      (of_reference ? reference : current).ranges[beam] += change;
+      const Match result = match(reference, current);
+      EXPECT_TRUE(result.displacement);
+      return result.displacement->reference_from_current;
+    };
+    const LaserScan& changed = of_reference ? reference_ : current_;
+    const double span = static_cast<double>(changed.ranges[beam] + h) - static_cast<double>(changed.ranges[beam] - h);
+    return error(at(h), at(-h)) / span;
+  }
+
+  void compare(bool of_reference) {
+    const Match nominal = match(reference_, current_);
+    ASSERT_TRUE(nominal.displacement);
+    ASSERT_EQ(nominal.displacement->dimension(), 3);
+    const Eigen::Matrix3Xd J = nominal.displacement->observable.inverse() *
+                               (of_reference ? nominal.displacement->J_reference : nominal.displacement->J_current);
+    Eigen::Matrix3Xd numerical(3, 0);
+    Eigen::Matrix3Xd analytical(3, 0);
+    for (std::size_t beam = 0; beam < reference_.ranges.size(); beam += 5) {
+      numerical.conservativeResize(3, numerical.cols() + 1);
+      analytical.conservativeResize(3, analytical.cols() + 1);
+      numerical.rightCols<1>() = numericalColumn(of_reference, beam);
+      analytical.rightCols<1>() = J.col(static_cast<Eigen::Index>(beam));
+    }
+    for (int row = 0; row < 3; ++row) {
+      const Eigen::VectorXd difference = numerical.row(row) - analytical.row(row);
+      // A range may move a point to another partner or a surface to another length: single columns jump, so the median
+      // tells about the derivative and the norm about the whole.
+      Eigen::VectorXd sorted = difference.cwiseAbs();
+      std::sort(sorted.data(), sorted.data() + sorted.size());
+      const double scale = numerical.row(row).norm() / std::sqrt(static_cast<double>(numerical.cols()));
+      EXPECT_LT(sorted(sorted.size() / 2), 0.03 * scale) << "row " << row;
+      EXPECT_LT(difference.norm(), 0.15 * numerical.row(row).norm()) << "row " << row;
+    }
+  }
+
+  SimulatedLaser laser_;
+  LaserScan reference_;
+  LaserScan current_;
+  ScanOptions options_;
+};
+
+TEST_F(Jacobians, ByTheRangesOfTheReferenceAgreeWithTheMatcherItself) { compare(true); }
+TEST_F(Jacobians, ByTheRangesOfTheCurrentScanAgreeWithTheMatcherItself) { compare(false); }
+
+TEST_F(Jacobians, OfARangeThatIsNotUsedAreZero) {
+  reference_.ranges[40] = std::numeric_limits<float>::quiet_NaN();
+  current_.ranges[41] = std::numeric_limits<float>::infinity();
+  const Match result = match(reference_, current_);
+  ASSERT_TRUE(result.displacement);
+  EXPECT_EQ(result.displacement->J_reference.col(40).norm(), 0.0);
+  EXPECT_EQ(result.displacement->J_current.col(41).norm(), 0.0);
+}
+
+/// Errors of many matches of noisy scans, in the directions that the scans see, beside what the matcher says of them.
+struct MonteCarlo {
+  Eigen::MatrixXd sample;   // covariance of the errors
+  Eigen::MatrixXd claimed;  // mean of the covariances
+  Eigen::VectorXd mean;     // of the errors
+  int failures = 0;
+};
+
+MonteCarlo monteCarlo(const World& world, const SE2& displacement, double noise, int runs, Eigen::Index dimension) {
+  std::mt19937_64 random(7);
+  SimulatedLaser laser;
+  laser.noise = noise;
+  // Fixed combinations of x, y, yaw: the matcher's own basis turns with the noise.
+  Eigen::MatrixXd seen = Eigen::MatrixXd::Identity(3, 3);
+  if (dimension == 2) seen = (Eigen::MatrixXd(2, 3) << 0, 1, 0, 0, 0, 1).finished();
+  MonteCarlo result{Eigen::MatrixXd::Zero(dimension, dimension), Eigen::MatrixXd::Zero(dimension, dimension),
+                    Eigen::VectorXd::Zero(dimension)};
+  int used = 0;
+  for (int run = 0; run < runs; ++run) {
+    const Match match = matchIn(world, SE2(), displacement, laser, prediction(displacement), &random);
+    if (!match.displacement || match.displacement->dimension() != dimension) {
+      ++result.failures;
+      continue;
+    }
+    const Displacement& z = *match.displacement;
+    const Eigen::VectorXd e = seen * error(z.reference_from_current, displacement);
+    const Eigen::MatrixXd V = z.observable.completeOrthogonalDecomposition().pseudoInverse();
+    result.sample += e * e.transpose();
+    result.mean += e;
+    result.claimed += seen * V * z.covariance() * V.transpose() * seen.transpose();
+    ++used;
+  }
+  result.mean /= used;
+  result.sample = (result.sample / used - result.mean * result.mean.transpose()).eval();
+  result.claimed /= used;
+  return result;
+}
+
+TEST(Covariance, AgreesWithMonteCarloInARoom) {
+  const MonteCarlo result = monteCarlo(room(), SE2(0.2, 0.05, 0.1), 0.02, 400, 3);
+  EXPECT_EQ(result.failures, 0);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double ratio = std::sqrt(result.claimed(axis, axis) / result.sample(axis, axis));
+    EXPECT_NEAR(ratio, 1.0, 0.2) << "axis " << axis << ", claimed std " << std::sqrt(result.claimed(axis, axis))
+                                 << ", seen " << std::sqrt(result.sample(axis, axis));
+    EXPECT_LT(std::abs(result.mean(axis)), std::sqrt(result.sample(axis, axis))) << "bias of axis " << axis;
+  }
+}
+
+TEST(Covariance, AgreesWithMonteCarloAcrossACorridor) {
+  const MonteCarlo result = monteCarlo(corridor(), SE2(0.3, 0.05, 0.05), 0.02, 400, 2);
+  EXPECT_EQ(result.failures, 0) << "matches that did not come out with two directions";
+  for (int axis = 0; axis < 2; ++axis) {
+    const double ratio = std::sqrt(result.claimed(axis, axis) / result.sample(axis, axis));
+    EXPECT_NEAR(ratio, 1.0, 0.2) << "axis " << axis << ", claimed std " << std::sqrt(result.claimed(axis, axis))
+                                 << ", seen " << std::sqrt(result.sample(axis, axis));
+  }
+}
+
+TEST(Observability, ACorridorTellsNothingAlongIt) {
+  std::mt19937_64 random(5);
+  for (const double noise : {0.0, 0.01, 0.03}) {
+    SimulatedLaser laser;
+    laser.noise = noise;
+    const SE2 truth(0.4, 0.0, 0.1);
+    const Match match = matchIn(corridor(), SE2(0.0, 0.2, 0.0), truth, laser, prediction(truth), &random);
+    ASSERT_TRUE(match.displacement) << toString(match.failure);
+    ASSERT_EQ(match.displacement->dimension(), 2) << "noise " << noise;
+    const Eigen::Vector3d along(1.0, 0.0, 0.0);
+    EXPECT_LT((match.displacement->observable * along).norm(), 0.1) << "noise " << noise;
+    // Where the scans see nothing, the prediction stays: its error of 5 cm along, none of it across.
+    EXPECT_NEAR(match.displacement->reference_from_current.x, truth.x + 0.05, 0.02);
+    EXPECT_NEAR(match.displacement->reference_from_current.y, truth.y, 0.01);
+  }
+}
+
+TEST(Observability, ARoundRoomTellsNothingAboutYaw) {
+  std::vector<Eigen::Vector2d> corners;
+  for (int i = 0; i < 720; ++i)
+    corners.emplace_back(4.0 * std::cos(i * M_PI / 360.0), 4.0 * std::sin(i * M_PI / 360.0));
+  std::mt19937_64 random(6);
+  SimulatedLaser laser;
+  laser.noise = 0.01;
+  const SE2 truth(0.2, 0.1, 0.15);
+  const Match match = matchIn(closedPolygon(corners), SE2(), truth, laser, prediction(truth), &random);
+  ASSERT_TRUE(match.displacement) << toString(match.failure);
+  EXPECT_EQ(match.displacement->dimension(), 2);
+}
+
+/// One short wall, 0.8 m wide and 2 m ahead: it tells the distance well, the yaw badly, and nothing along itself.
+TEST(Observability, WhatIsNotKnownWellEnoughIsNotSeen) {
+  const World world{{{2.0, -0.4}, {2.0, 0.4}}};
+  std::mt19937_64 random(8);
+  SimulatedLaser laser;
+  laser.beams = 720;
+  laser.angle_increment = M_PI / 360.0;
+  laser.noise = 0.02;
+  const SE2 truth(0.05, 0.0, 0.0);
+  const auto reference = prepare(simulateScan(world, SE2(), laser, &random), laser);
+  const auto current = prepare(simulateScan(world, truth, laser, &random), laser);
+  const auto dimensionFor = [&](double max_std) {
+    MatcherOptions options;
+    options.estimation.observability.max_std = max_std;
+    const Match match = ScanMatcher(options).match(*reference, *current, prediction(truth, {0.02, 0.0, 0.01}));
+    EXPECT_EQ(match.failure == MatchFailure::kNotObservable, !match.displacement) << toString(match.failure);
+    return match.displacement ? match.displacement->dimension() : 0;
+  };
+  EXPECT_EQ(dimensionFor(1.0), 2);
+  EXPECT_EQ(dimensionFor(0.02), 1);
+  EXPECT_EQ(dimensionFor(1e-6), 0);
+}
+
+TEST(Failures, ScansOfDifferentPlacesDoNotMatch) {
+  const SimulatedLaser laser;
+  const World far_room = closedPolygon({{-12.0, -11.0}, {13.0, -11.0}, {13.0, 14.0}, {-12.0, 14.0}});
+  const auto reference = prepare(simulateScan(room(), SE2(), laser), laser);
+  const auto current = prepare(simulateScan(far_room, SE2(), laser), laser);
+  const Match match = ScanMatcher(MatcherOptions()).match(*reference, *current, prediction(SE2()));
+  EXPECT_FALSE(match.displacement);
+  EXPECT_EQ(match.failure, MatchFailure::kTooFewPairs) << toString(match.failure);
+}
+
+TEST(Failures, TooSmallAShareOfPairsIsNoOverlap) {
+  MatcherOptions options;
+  options.min_overlap = 1.0;
+  const SimulatedLaser laser;
+  const auto reference = prepare(simulateScan(room(), SE2(), laser), laser);
+  const auto current = prepare(simulateScan(room(), kDisplacement, laser), laser);
+  const Match match = ScanMatcher(options).match(*reference, *current, prediction(kDisplacement));
+  EXPECT_FALSE(match.displacement);
+  EXPECT_EQ(match.failure, MatchFailure::kNoOverlap) << toString(match.failure);
+}
+
+TEST(Failures, AnEstimateFarFromTheAlignmentDiverged) {
+  MatcherOptions options;
+  options.max_refinement = 1e-12;
+  const SimulatedLaser laser;
+  const auto reference = prepare(simulateScan(room(), SE2(), laser), laser);
+  const auto current = prepare(simulateScan(room(), kDisplacement, laser), laser);
+  const Match match = ScanMatcher(options).match(*reference, *current, prediction(kDisplacement));
+  EXPECT_FALSE(match.displacement);
+  EXPECT_EQ(match.failure, MatchFailure::kDiverged) << toString(match.failure);
+}
+
+TEST(Failures, EveryReasonHasItsWords) {
+  for (const MatchFailure failure :
+       {MatchFailure::kTooFewPairs, MatchFailure::kNoOverlap, MatchFailure::kDiverged, MatchFailure::kNotObservable}) {
+    EXPECT_NE(toString(failure), "unknown");
+    EXPECT_NE(toString(failure), "none");
+  }
+}
+
+}  // namespace
+}  // namespace sckf::test
