@@ -10,12 +10,13 @@ import numpy as np
 import rosbag
 import roslib.packages
 import rospy
+import yaml
 
 import junit_runner
 import run_helpers as helpers
 import simulated_bag
 
-RAWLOG = '/usr/share/mrpt_common/datasets/2006-01ENE-21-SENA_Telecom Faculty_one_loop_only.rawlog'
+RAWLOG = '/usr/share/mrpt/datasets/2006-01ENE-21-SENA_Telecom Faculty_one_loop_only.rawlog'
 
 
 def find_tool(name):
@@ -151,8 +152,10 @@ class ReplayNodelet(unittest.TestCase):
         tool = find_tool('replay')
         if not tool:
             self.skipTest('no replay tool')
-        tum = os.path.join(self.folder.name, 'replay.tum')
-        subprocess.check_call([tool, self.bag, '--trajectory', tum], stdout=subprocess.DEVNULL)
+        tum, params = (os.path.join(self.folder.name, name) for name in ('replay.tum', 'params.yaml'))
+        with open(params, 'w') as out:
+            yaml.safe_dump(rospy.get_param('/sckf_odometry'), out)
+        subprocess.check_call([tool, self.bag, '--trajectory', tum, '--params', params], stdout=subprocess.DEVNULL)
         stamps, poses = self.recorder.trajectory('pose')
         replay_stamps, replay_poses = helpers.read_tum(tum)
         distance, angle = helpers.difference(stamps, poses, replay_stamps, replay_poses)
