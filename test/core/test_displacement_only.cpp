@@ -14,7 +14,8 @@ namespace {
 using Correlations = DisplacementOnly::Correlations;
 
 constexpr int kRanges = 12;
-const Eigen::VectorXd kVariances = Eigen::VectorXd::Constant(kRanges, 0.01 * 0.01);
+constexpr double kRangeStd = 0.01;
+const Eigen::VectorXd kVariances = Eigen::VectorXd::Constant(kRanges, kRangeStd* kRangeStd);
 
 /// One scan of a way: how the wheels bring the robot there, what matching it to the reference sees, what then.
 struct Leg {
@@ -55,14 +56,17 @@ class Way {
     const auto draw = [random](const Eigen::MatrixXd& P) -> Eigen::VectorXd {
       return random != nullptr ? random->drawnFrom(P) : Eigen::VectorXd::Zero(P.rows());
     };
-    const Eigen::MatrixXd R = kVariances.asDiagonal();
+    const auto drawRanges = [random]() -> Eigen::VectorXd {
+      if (random == nullptr) return Eigen::VectorXd::Zero(kRanges);
+      return kRangeStd * random->gaussian(kRanges);
+    };
     DisplacementOnly method(corrected(kStart, draw(P_0_)), P_0_, correlations);
-    Eigen::VectorXd reference_noise = draw(R);
+    Eigen::VectorXd reference_noise = drawRanges();
     method.clone(kVariances);
     for (std::size_t i = 0; i < legs_.size(); ++i) {
       method.propagate({corrected(legs_[i].moved, draw(legs_[i].Q)), legs_[i].Q});
       Displacement z = displacements_[i];
-      const Eigen::VectorXd noise = draw(R);
+      const Eigen::VectorXd noise = drawRanges();
       if (z.dimension() > 0) {
         const Eigen::VectorXd e = z.J_reference * reference_noise + z.J_current * noise + draw(z.matching_noise);
         z.reference_from_current = corrected(z.reference_from_current, z.observable.transpose() * e);

@@ -13,8 +13,8 @@ namespace {
 
 using Covariance = DisplacementCovariance<6>;
 
-SE3 randomMotion(RandomInputs& random) {
-  return {random.gaussian(3), rotationExp(random.gaussian(3).normalized() * random.uniform(0.1, 3.0))};
+SE3 randomMotion(RandomInputs& random, double largest_angle = 3.0) {
+  return {random.gaussian(3), rotationExp(random.gaussian(3).normalized() * random.uniform(0.1, largest_angle))};
 }
 
 template <typename Function>
@@ -78,7 +78,7 @@ class Way {
   Way(int steps, RandomInputs& random) {
     Eigen::MatrixXd J_before = random.gaussian(6, kRanges);
     for (int i = 0; i < steps; ++i) {
-      motions_.push_back(randomMotion(random));
+      motions_.push_back(randomMotion(random, 0.3));
       Covariance::Measurement z;
       z.seen = Matrix6d::Identity();
       z.J_reference = -0.9 * J_before + 0.4 * random.gaussian(6, kRanges);
@@ -143,11 +143,11 @@ TEST_P(DisplacementsInSpace, HaveTheCovarianceOfTheirErrors) {
 
 TEST_P(DisplacementsInSpace, HaveNotWithoutTheTermC) {
   RandomInputs random(115);
-  Way way(GetParam(), random);
-  const Matrix6d with_C = way.covariance(Covariance::Correlations::kKept);
+  const Way way(GetParam(), random);
   const Matrix6d without_C = way.covariance(Covariance::Correlations::kIgnored);
-  EXPECT_FALSE(covariancesAgree(without_C, with_C));
-  EXPECT_GT(without_C.trace(), 1.2 * with_C.trace());
+  const Matrix6d sampled = way.sampleCovariance(kDraws, random);
+  EXPECT_FALSE(covariancesAgree(without_C, sampled));
+  EXPECT_GT(without_C.trace(), 1.05 * sampled.trace());
 }
 
 INSTANTIATE_TEST_SUITE_P(SharedScans, DisplacementsInSpace, ::testing::Values(2, 3));
