@@ -147,6 +147,9 @@ void ScKfOdometryNode::addOdometry(const OdometrySample& sample) {
     case OdometryBuffer::Insertion::kTooOld:
       refuseOdometry("it came after a scan that was taken later");
       break;
+    case OdometryBuffer::Insertion::kNotFinite:
+      refuseOdometry("its pose is not finite");
+      break;
   }
   advance();
   publisher_.addWheels(sample);
