@@ -1,0 +1,25 @@
+// Reproducible random numbers for the simulations.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <random>
+
+namespace sckf {
+
+class RandomDraws {
+ public:
+  explicit RandomDraws(std::uint64_t seed) : engine_(seed) {}
+
+  double uniform(double low, double high) { return std::uniform_real_distribution<>(low, high)(engine_); }
+  double gaussian() { return normal_(engine_); }
+  Eigen::VectorXd gaussian(Eigen::Index n) {
+    return Eigen::VectorXd::NullaryExpr(n, [this] { return normal_(engine_); });
+  }
+
+ private:
+  std::mt19937_64 engine_;
+  std::normal_distribution<> normal_;
+};
+
+}  // namespace sckf

@@ -1,0 +1,226 @@
+// The simulations of the paper's experiments, as tables: what the script `experiment` draws.
+#include <algorithm>
+#include <boost/program_options.hpp>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <iostream>
+#include <map>
+
+#include "sckf_odometry/experiments/complexity.h"
+#include "sckf_odometry/experiments/csv_file.h"
+#include "sckf_odometry/experiments/line_matching.h"
+#include "sckf_odometry/experiments/one_dimension.h"
+#include "sckf_odometry/experiments/visual_odometry.h"
+#include "sckf_odometry/tools/progress_bar.h"
+
+namespace sckf {
+
+namespace {
+
+/// Every experiment has its options; of the command line it takes those that are its own.
+struct Arguments {
+  std::string name;
+  std::string output = ".";
+  int runs = 0;  // 0: as the experiment has it
+  std::uint64_t seed = 1;
+  OneDimensionOptions one_dimension;
+  LineMatchingOptions line_matching;
+  VisualOdometryOptions visual_odometry;
+
+  std::string file(const std::string& table) const { return output + "/" + table + ".csv"; }
+};
+
+std::vector<double> logSpaced(double low, double high, int count) {
+  std::vector<double> values;
+  for (int i = 0; i < count; ++i) values.push_back(low * std::pow(high / low, static_cast<double>(i) / (count - 1)));
+  return values;
+}
+
+std::vector<double> operator+(std::vector<double> a, const Eigen::Vector3d& b) {
+  a.insert(a.end(), b.data(), b.data() + b.size());
+  return a;
+}
+
+void oneDimension(const Arguments& arguments) {
+  const OneDimensionOptions& options = arguments.one_dimension;
+  CsvFile curves(arguments.file("one_dimension_closed_form"), "spacing,with_c,with_c_and_first,without_c");
+  for (int i = 1; i < 100; ++i) {
+    const double spacing = 0.009 * options.field * i + 0.001 * options.field;
+    const double with = closedForm(options, spacing);
+    curves.row({spacing, with, with + firstDisplacementExcess(options, spacing),
+                closedFormWithoutCorrelations(options, spacing)});
+  }
+  std::vector<double> spacings{0.01, 0.02, 0.03, 0.05};
+  for (int i = 1; i <= 9; ++i) spacings.push_back(0.1 * i);
+  for (double& spacing : spacings) spacing *= options.field;
+  ProgressBar progress(spacings.size());
+  const auto points = simulateOneDimension(options, spacings, [&progress] { progress.advance(); });
+  progress.finish();
+  CsvFile simulated(arguments.file("one_dimension_simulated"), "spacing,runs,with_c,without_c,squared_error");
+  for (const OneDimensionPoint& p : points) {
+    simulated.row({p.spacing, static_cast<double>(options.runs), p.with_correlations, p.without, p.squared_error});
+  }
+}
+
+void writeRatio(CsvFile& table, const std::string& parameter, double value, const LineMatchingOptions& options,
+                const std::function<void()>& tick) {
+  const auto with = simulateLineMatching(options, "sckf", tick);
+  const auto without = simulateLineMatching(options, "sckf_nc", tick);
+  const Eigen::Vector3d ratio = rootMeanSquare(with).cwiseQuotient(rootMeanSquare(without));
+  table.row(parameter, std::vector<double>{value} + ratio);
+}
+
+/// The ratio of the rms errors, each parameter varied alone.
+void lineMatchingRatios(const Arguments& arguments) {
+  LineMatchingOptions base = arguments.line_matching;
+  base.runs = std::max(10, base.runs / 2);
+  const std::vector<double> factors{0.25, 0.5, 1.0, 2.0, 4.0};
+  CsvFile table(arguments.file("line_matching_ratios"), "parameter,value,x,y,yaw");
+  ProgressBar progress(3 * factors.size() * 2 * static_cast<std::size_t>(base.runs));
+  const auto tick = [&progress] { progress.advance(); };
+  const std::map<std::string, double LineMatchingOptions::*> parameters{
+      {"range_std", &LineMatchingOptions::range_std},
+      {"odometry_noise", &LineMatchingOptions::odometry_noise},
+      {"spacing", &LineMatchingOptions::spacing}};
+  for (const auto& [name, member] : parameters) {
+    for (const double factor : factors) {
+      LineMatchingOptions options = base;
+      options.*member *= factor;
+      writeRatio(table, name, options.*member, options, tick);
+    }
+  }
+  progress.finish();
+}
+
+void lineMatching(const Arguments& arguments) {
+  const LineMatchingOptions& options = arguments.line_matching;
+  ProgressBar progress(2 * static_cast<std::size_t>(options.runs));
+  for (const std::string method : {"sckf", "sckf_nc"}) {
+    CsvFile table(arguments.file("line_matching_" + method),
+                  "way,runs,error_x,error_y,error_yaw,std_x,std_y,std_yaw,squared_x,squared_y,squared_yaw,"
+                  "variance_x,variance_y,variance_yaw,normalized_x,normalized_y,normalized_yaw,"
+                  "inside_x,inside_y,inside_yaw,nees");
+    for (const auto& s : simulateLineMatching(options, method, [&progress] { progress.advance(); })) {
+      const std::vector<double> row = std::vector<double>{s.way, static_cast<double>(options.runs)} +
+                                      s.error_of_first_run + s.std + s.squared_error + s.variance +
+                                      s.normalized_square + s.inside;
+      std::vector<double> whole = row;
+      whole.push_back(s.nees);
+      table.row(whole);
+    }
+  }
+  progress.finish();
+  lineMatchingRatios(arguments);
+}
+
+void visualOdometry(const Arguments& arguments) {
+  const VisualOdometryOptions& options = arguments.visual_odometry;
+  std::vector<double> spacings;
+  for (const double share : {0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55}) {
+    spacings.push_back(share * options.camera.far);
+  }
+  ProgressBar progress(spacings.size() * static_cast<std::size_t>(options.runs));
+  const auto points = simulateVisualOdometry(options, spacings, [&progress] { progress.advance(); });
+  progress.finish();
+  CsvFile table(arguments.file("visual_odometry"),
+                "spacing,runs,position_with_c,position_without_c,position_scatter,attitude_with_c,"
+                "attitude_without_c,attitude_scatter,shared_features,mean_error");
+  for (const VisualOdometryPoint& p : points) {
+    table.row({p.spacing, static_cast<double>(options.runs), p.with_correlations.position, p.without.position,
+               p.scatter.position, p.with_correlations.attitude, p.without.attitude, p.scatter.attitude, p.features,
+               p.mean_error});
+  }
+}
+
+void complexity(const Arguments& arguments) {
+  constexpr int kMaxDense = 3200;  // 80 MB; of 10 000 ranges it would be 800
+  std::vector<int> ranges;
+  for (const double m : logSpaced(100.0, 10000.0, 13)) ranges.push_back(static_cast<int>(std::lround(m)));
+  ProgressBar progress(ranges.size());
+  const auto times = measureUpdates(ranges, kMaxDense, [&progress] { progress.advance(); });
+  progress.finish();
+  CsvFile table(arguments.file("complexity"), "ranges,sckf,sckf_nc,dense");
+  for (const UpdateTimes& t : times) table.row({static_cast<double>(t.ranges), t.sckf, t.sckf_nc, t.dense});
+}
+
+const std::map<std::string, std::function<void(const Arguments&)>>& experiments() {
+  static const std::map<std::string, std::function<void(const Arguments&)>> all{{"one_dimension", oneDimension},
+                                                                                {"line_matching", lineMatching},
+                                                                                {"visual_odometry", visualOdometry},
+                                                                                {"complexity", complexity}};
+  return all;
+}
+
+boost::program_options::options_description optionsFor(Arguments& a) {
+  namespace po = boost::program_options;
+  const auto value = [](auto* target) { return po::value(target)->default_value(*target); };
+  po::options_description shown("options");
+  // clang-format off
+  shown.add_options()("help,h", "show this help")
+    ("output", value(&a.output), "folder for the tables")
+    ("runs", value(&a.runs), "of the Monte Carlo simulation; 0: 400, 200 and 40 of the three below")
+    ("seed", value(&a.seed), "of the random numbers");
+  po::options_description one("one_dimension");
+  one.add_options()("density", value(&a.one_dimension.density), "features per metre")
+    ("field", value(&a.one_dimension.field), "range of the sensor [m]")
+    ("distance-std", value(&a.one_dimension.range_std), "std of a distance [m]");
+  po::options_description line("line_matching");
+  line.add_options()("range-std", value(&a.line_matching.range_std), "std of a range [m]")
+    ("odometry-noise", value(&a.line_matching.odometry_noise), "std of the wheels after 1 m [m and rad]")
+    ("spacing", value(&a.line_matching.spacing), "of the scans [m]")
+    ("beams", value(&a.line_matching.beams), "of a scan")
+    ("laps", value(&a.line_matching.laps), "times around the circle");
+  po::options_description stereo("visual_odometry");
+  stereo.add_options()("pixel-std", value(&a.visual_odometry.pixel_std), "std of a pixel coordinate")
+    ("features", value(&a.visual_odometry.features), "per cubic metre")
+    ("far", value(&a.visual_odometry.camera.far), "depth of the farthest features [m]");
+  // clang-format on
+  return shown.add(one).add(line).add(stereo);
+}
+
+/// False if the help was asked for, and shown.
+bool parse(int argc, char** argv, Arguments& arguments) {
+  namespace po = boost::program_options;
+  const po::options_description shown = optionsFor(arguments);
+  po::options_description all(shown);
+  all.add_options()("name", po::value(&arguments.name));
+  po::positional_options_description positional;
+  positional.add("name", 1);
+  po::variables_map values;
+  po::store(po::command_line_parser(argc, argv).options(all).positional(positional).run(), values);
+  po::notify(values);
+  if (values.count("help") != 0) {
+    std::cout << "usage: experiment_data NAME --output DIR [options]\n\nNAME:";
+    for (const auto& [name, experiment] : experiments()) std::cout << " " << name;
+    std::cout << "\n\nSimulates an experiment of the paper and writes its numbers.\n\n" << shown;
+    return false;
+  }
+  if (experiments().count(arguments.name) == 0) throw po::error("there is no experiment of that name; see --help");
+  if (arguments.runs < 0) throw po::error("--runs must not be negative");
+  if (arguments.runs > 0) {
+    arguments.one_dimension.runs = arguments.line_matching.runs = arguments.visual_odometry.runs = arguments.runs;
+  }
+  arguments.one_dimension.seed = arguments.line_matching.seed = arguments.visual_odometry.seed = arguments.seed;
+  return true;
+}
+
+}  // namespace
+
+}  // namespace sckf
+
+int main(int argc, char** argv) {
+  try {
+    sckf::Arguments arguments;
+    if (!sckf::parse(argc, argv, arguments)) return 0;
+    std::filesystem::create_directories(arguments.output);
+    sckf::experiments().at(arguments.name)(arguments);
+    return 0;
+  } catch (const boost::program_options::error& error) {
+    std::cerr << "experiment_data: " << error.what() << '\n';
+    return 2;
+  } catch (const std::exception& error) {
+    std::cerr << "experiment_data: " << error.what() << '\n';
+    return 1;
+  }
+}
