@@ -11,6 +11,7 @@ bool earlier(const OdometrySample& sample, Stamp stamp) { return sample.stamp < 
 }  // namespace
 
 OdometryBuffer::Insertion OdometryBuffer::insert(const OdometrySample& sample) {
+  if (!sample.odom_from_base.vector().allFinite()) return Insertion::kNotFinite;
   if (discarded_ && sample.stamp < *discarded_) return Insertion::kTooOld;
   const auto place = std::lower_bound(samples_.begin(), samples_.end(), sample.stamp, earlier);
   if (place != samples_.end() && place->stamp == sample.stamp) return Insertion::kDuplicate;

@@ -65,11 +65,13 @@ ScanOdometry::ScanOdometry(const PipelineOptions& options)
 }
 
 OdometryBuffer::Insertion ScanOdometry::addOdometry(const OdometrySample& sample) {
-  if (!odometry_.empty() && sample.stamp > odometry_.newest()) {
-    twist_.add(increment({odometry_.newestSample(), sample}), seconds(sample.stamp - odometry_.newest()));
-  }
+  std::optional<OdometrySample> before;
+  if (!odometry_.empty()) before = odometry_.newestSample();
   const OdometryBuffer::Insertion insertion = odometry_.insert(sample);
   if (insertion != OdometryBuffer::Insertion::kInserted) return insertion;
+  if (before && sample.stamp > before->stamp) {
+    twist_.add(increment({*before, sample}), seconds(sample.stamp - before->stamp));
+  }
   if (!filter_) start(sample);
   // Without scans the filter follows the wheels at a distance, so that the buffer stays small.
   const Stamp too_old = odometry_.newest() - fromSeconds(options_.max_scan_delay);

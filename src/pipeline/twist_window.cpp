@@ -1,8 +1,17 @@
 #include "sckf_odometry/pipeline/twist_window.h"
 
-#include "sckf_odometry/core/dead_reckoning.h"
-
 namespace sckf {
+
+namespace {
+
+/// The way along the curve of an increment, and its rotation: seen from half-way, the chord of an arc points ahead.
+Eigen::Vector3d alongTheCurve(const SE2& motion) {
+  Eigen::Vector3d way;
+  way << SE2(0.0, 0.0, -0.5 * motion.yaw) * motion.translation(), motion.yaw;
+  return way;
+}
+
+}  // namespace
 
 void TwistWindow::add(const OdometryIncrement& increment, double dt) {
   parts_.push_back({increment, dt});
@@ -15,9 +24,12 @@ void TwistWindow::add(const OdometryIncrement& increment, double dt) {
 
 Twist TwistWindow::twist() const {
   if (covered_ < duration_) return {};
-  DeadReckoning motion(SE2(), Eigen::Matrix3d::Zero());
-  for (const Part& part : parts_) motion.propagate(part.increment);
-  return {motion.pose().vector() / covered_, motion.covariance() / (covered_ * covered_)};
+  Twist twist{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
+  for (const Part& part : parts_) {
+    twist.mean += alongTheCurve(part.increment.before_from_after) / covered_;
+    twist.covariance += part.increment.covariance / (covered_ * covered_);
+  }
+  return twist;
 }
 
 }  // namespace sckf

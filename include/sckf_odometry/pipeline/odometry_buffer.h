@@ -20,7 +20,12 @@ struct OdometrySample {
 /// Keeps what is needed to tell the motion between any two instants after the last one asked for.
 class OdometryBuffer {
  public:
-  enum class Insertion { kInserted, kDuplicate, kTooOld };
+  enum class Insertion {
+    kInserted,
+    kDuplicate,  ///< there is a sample of this stamp already
+    kTooOld,     ///< increments up to a later instant have been taken
+    kNotFinite,  ///< its pose is no pose
+  };
 
   /// Samples may come in any order, but not before the instant up to which increments have been taken.
   Insertion insert(const OdometrySample& sample);
