@@ -261,10 +261,7 @@ std::string ScKfOdometryNode::waitingFor() const {
     return "odometry on TF, " + node.tf_odometry_frame + " -> " + node.base_frame + " " + tf_.odometryProblem();
   }
   if (counts_.odometry == 0) return "odometry on " + odometry_topic_;
-  if (!scans_without_mount_.empty()) {
-    const std::string frame = frameName(scans_without_mount_.back()->header.frame_id);
-    return "the mount of the laser, " + node.base_frame + " -> " + frame + " on TF: " + mount_problem_;
-  }
+  if (!scans_without_mount_.empty()) return "the mount of the laser: " + mount_problem_;
   if (counts_.scans.empty()) return "scans on " + scan_topic_;
   return "";
 }

@@ -49,7 +49,9 @@ std::optional<Eigen::Isometry3d> TfInput::baseFrom(const std::string& frame, std
   try {
     return mounts_[frame] = toIsometry(buffer_.lookupTransform(base_frame_, frame, ros::Time(0)).transform);
   } catch (const tf2::TransformException& exception) {
-    if (problem != nullptr) *problem = exception.what();
+    if (problem != nullptr) {
+      *problem = "no transform " + base_frame_ + " -> " + frame + " on TF: " + exception.what();
+    }
     return std::nullopt;
   }
 }
@@ -60,8 +62,7 @@ std::optional<OdometrySample> TfInput::inBaseFrame(const OdometrySample& sample,
   if (const auto base_from_child = baseFrom(child_frame, problem)) {
     return moved(sample, toPlanar(base_from_child->inverse()));
   }
-  *problem = "child_frame_id is \"" + child_frame + "\", ~base_frame \"" + base_frame_ +
-             "\" expected, or a transform between the two: " + *problem;
+  *problem = "child_frame_id is \"" + child_frame + "\", ~base_frame \"" + base_frame_ + "\" expected; " + *problem;
   return std::nullopt;
 }
 
