@@ -45,8 +45,8 @@ std::vector<double> operator+(std::vector<double> a, const Eigen::Vector3d& b) {
 void oneDimension(const Arguments& arguments) {
   const OneDimensionOptions& options = arguments.one_dimension;
   CsvFile curves(arguments.file("one_dimension_closed_form"), "spacing,with_c,with_c_and_first,without_c");
-  for (int i = 1; i < 100; ++i) {
-    const double spacing = 0.009 * options.field * i + 0.001 * options.field;
+  for (int i = 0; i <= 100; ++i) {
+    const double spacing = (0.01 + 0.009 * i) * options.field;
     const double with = closedForm(options, spacing);
     curves.row({spacing, with, with + firstDisplacementExcess(options, spacing),
                 closedFormWithoutCorrelations(options, spacing)});
