@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace sckf {
 
@@ -32,16 +33,12 @@ class Search {
         prior_information_((prediction.covariance + priorFloor(options)).inverse()),
         options_(options) {}
 
-  /// From the predicted displacement; from other yaws too if the scans do not fall together there.
+  /// From the predicted displacement; if the scans do not fall together there, from the best of other yaws too.
   std::optional<Alignment> run() const {
     std::optional<Alignment> best = align(mean_);
-    if (best && !suspicious(*best)) return best;
-    for (int k = 1; k <= options_.search_yaw_steps; ++k) {
-      for (const double side : {-1.0, 1.0}) {
-        std::optional<Alignment> other = align({mean_.x, mean_.y, mean_.yaw + side * k * options_.search_yaw_step});
-        if (other && (!best || other->cost < best->cost)) best.emplace(std::move(*other));
-      }
-    }
+    if ((best && !suspicious(*best)) || options_.search_yaw_steps == 0) return best;
+    std::optional<Alignment> other = align(bestOtherYaw());
+    if (other && (!best || other->cost < best->cost)) best.emplace(std::move(*other));
     return best;
   }
 
@@ -50,6 +47,22 @@ class Search {
     return Eigen::Vector3d(options.prior_std_translation, options.prior_std_translation, options.prior_std_yaw)
         .cwiseAbs2()
         .asDiagonal();
+  }
+
+  /// Of the yaws beside the prediction, the one at which the scans fall together best as they are.
+  SE2 bestOtherYaw() const {
+    SE2 best;
+    double least = std::numeric_limits<double>::infinity();
+    for (int k = -options_.search_yaw_steps; k <= options_.search_yaw_steps; ++k) {
+      if (k == 0) continue;
+      const SE2 x(mean_.x, mean_.y, mean_.yaw + k * options_.search_yaw_step);
+      const double cost = AlignmentProblem(reference_, current_, x, options_.icp_pair_distance, options_.pairs).cost(x);
+      if (cost < least) {
+        least = cost;
+        best = x;
+      }
+    }
+    return best;
   }
 
   SE2 icp(const SE2& start) const {
