@@ -18,9 +18,9 @@ struct MatcherOptions {
   int max_iterations = 15;              ///< of the alignment after CICP
   double prior_std_translation = 0.05;  ///< [m] added to the prediction's std of x and y, for the pairing of points
   double prior_std_yaw = 0.05;          ///< [rad] … and to its std of yaw
-  double search_below_overlap = 0.6;    ///< more start yaws are tried if a smaller share of the points has a partner
+  double search_below_overlap = 0.7;    ///< more start yaws are tried if a smaller share of the points has a partner
   double search_yaw_step = 0.12;        ///< [rad] between the start yaws
-  int search_yaw_steps = 2;             ///< start yaws to either side of the prediction
+  int search_yaw_steps = 4;             ///< start yaws to either side of the prediction
   int min_pairs = 20;                   ///< fewer points with a partner are "too few pairs"
   double min_overlap = 0.2;             ///< a smaller share of the points with a partner is "no overlap"
   double max_refinement = 0.5;  ///< [m, rad] a larger correction of the aligned pose by the estimate is "diverged"
