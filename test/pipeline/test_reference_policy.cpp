@@ -1,0 +1,115 @@
+#include <gtest/gtest.h>
+
+#include "sckf_odometry/pipeline/reference_policy.h"
+
+namespace sckf {
+namespace {
+
+constexpr double kGoodOverlap = 0.9;
+
+/// Limits that no test of one of them meets by accident with another.
+ReferenceOptions limits() {
+  ReferenceOptions options;
+  options.kf_dist_linear = 1.0;
+  options.kf_dist_angular = 0.5;
+  options.kf_min_overlap = 0.6;
+  options.kf_max_failures = 3;
+  return options;
+}
+
+TEST(ReferencePolicy, KeepsTheReferenceWhileTheRobotIsNear) {
+  ReferencePolicy policy(limits());
+  for (int i = 0; i < 100; ++i) {
+    EXPECT_FALSE(policy.replaces(SE2(0.4, 0.1 * (i % 2), 0.1), kGoodOverlap, true)) << i;
+  }
+}
+
+/// At 0.3 m per scan the scan at 0.9 m becomes the reference: the next one would be at 1.2 m, beyond the limit.
+TEST(ReferencePolicy, LooksAheadByTheLastStep) {
+  ReferencePolicy policy(limits());
+  EXPECT_FALSE(policy.replaces(SE2(0.3, 0, 0), kGoodOverlap, true));
+  EXPECT_FALSE(policy.replaces(SE2(0.6, 0, 0), kGoodOverlap, true));
+  EXPECT_TRUE(policy.replaces(SE2(0.9, 0, 0), kGoodOverlap, true));
+}
+
+TEST(ReferencePolicy, TheWayCountsInAnyDirection) {
+  for (const SE2& step : {SE2(-0.6, 0, 0), SE2(0, 0.6, 0), SE2(0, -0.6, 0), SE2(0.45, -0.45, 0)}) {
+    EXPECT_TRUE(ReferencePolicy(limits()).replaces(step, kGoodOverlap, true)) << step.vector().transpose();
+  }
+  EXPECT_FALSE(ReferencePolicy(limits()).replaces(SE2(0.3, 0.3, 0), kGoodOverlap, true));
+}
+
+TEST(ReferencePolicy, AnyRotationCounts) {
+  for (const double sign : {1.0, -1.0}) {
+    ReferencePolicy policy(limits());
+    EXPECT_FALSE(policy.replaces(SE2(0, 0, sign * 0.2), kGoodOverlap, true));
+    EXPECT_TRUE(policy.replaces(SE2(0, 0, sign * 0.4), kGoodOverlap, true));
+  }
+}
+
+TEST(ReferencePolicy, ExactlyAtTheLimitItIsKept) {
+  EXPECT_FALSE(ReferencePolicy(limits()).replaces(SE2(0.5, 0, 0), kGoodOverlap, true));
+  EXPECT_FALSE(ReferencePolicy(limits()).replaces(SE2(0, 0, 0.25), kGoodOverlap, true));
+  EXPECT_TRUE(ReferencePolicy(limits()).replaces(SE2(0.501, 0, 0), kGoodOverlap, true));
+  EXPECT_TRUE(ReferencePolicy(limits()).replaces(SE2(0, 0, 0.251), kGoodOverlap, true));
+}
+
+TEST(ReferencePolicy, TheStepBeginsAnewAtANewReference) {
+  ReferencePolicy policy(limits());
+  EXPECT_TRUE(policy.replaces(SE2(0.9, 0, 0), kGoodOverlap, true));
+  // From the new reference: a step of 0.4 m, not one back by 0.5 m.
+  EXPECT_FALSE(policy.replaces(SE2(0.4, 0, 0), kGoodOverlap, true));
+}
+
+TEST(ReferencePolicy, ReplacesWhereScansHardlyOverlap) {
+  EXPECT_TRUE(ReferencePolicy(limits()).replaces(SE2(), 0.59, true));
+  EXPECT_FALSE(ReferencePolicy(limits()).replaces(SE2(), 0.61, true));
+}
+
+/// A scan that could not be used, as of a person before the laser, says nothing about the reference by itself …
+TEST(ReferencePolicy, TheOverlapOfAScanThatWasNotUsedDoesNotCount) {
+  EXPECT_FALSE(ReferencePolicy(limits()).replaces(SE2(), 0.0, false));
+}
+
+/// … but a number of them in a row does.
+TEST(ReferencePolicy, ReplacesAfterFailuresInARow) {
+  ReferencePolicy policy(limits());
+  for (int round = 0; round < 2; ++round) {
+    EXPECT_FALSE(policy.replaces(SE2(), 0.0, false)) << round;
+    EXPECT_FALSE(policy.replaces(SE2(), 0.0, false)) << round;
+    EXPECT_TRUE(policy.replaces(SE2(), 0.0, false)) << round;
+  }
+}
+
+TEST(ReferencePolicy, ASuccessEndsTheRowOfFailures) {
+  ReferencePolicy policy(limits());
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_FALSE(policy.replaces(SE2(), 0.0, false)) << i;
+    EXPECT_FALSE(policy.replaces(SE2(), 0.0, false)) << i;
+    EXPECT_FALSE(policy.replaces(SE2(), kGoodOverlap, true)) << i;
+  }
+}
+
+TEST(ReferencePolicy, OneFailureIsEnoughIfSoChosen) {
+  ReferenceOptions options = limits();
+  options.kf_max_failures = 1;
+  EXPECT_TRUE(ReferencePolicy(options).replaces(SE2(), 0.0, false));
+}
+
+TEST(ReferencePolicy, AFarScanReplacesEvenIfItFailed) {
+  EXPECT_TRUE(ReferencePolicy(limits()).replaces(SE2(2.0, 0, 0), 0.0, false));
+}
+
+/// The algorithm of the paper: every scan is the next one's reference, as long as the robot moves at all.
+TEST(ReferencePolicy, ZeroDistancesMakeEveryScanAReference) {
+  ReferenceOptions options = limits();
+  options.kf_dist_linear = 0.0;
+  options.kf_dist_angular = 0.0;
+  ReferencePolicy policy(options);
+  for (const SE2& step : {SE2(1e-3, 0, 0), SE2(0, -1e-6, 0), SE2(0, 0, 1e-6), SE2(0.5, 0.1, 0.1)}) {
+    EXPECT_TRUE(policy.replaces(step, kGoodOverlap, true)) << step.vector().transpose();
+  }
+}
+
+}  // namespace
+}  // namespace sckf

@@ -1,0 +1,273 @@
+// What the pipeline makes of scans that cannot be matched, contradict the wheels, or do not see everything.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "pipeline/simulated_drive.h"
+
+namespace sckf::test {
+namespace {
+
+/// Wheels that are better than the defaults think, so that small contradictions are seen.
+PipelineOptions trustingTheWheels() {
+  PipelineOptions options;
+  options.odometry_noise = {0.03, 0.02, 0.05, 0.03};
+  return options;
+}
+
+/// A scan with every range the same: NaN, or infinite where the laser sees nothing.
+LaserScan constantScan(const SimulatedDrive& drive, int ms, float range) {
+  LaserScan scan = drive.scan(ms);
+  for (float& r : scan.ranges) r = range;
+  return scan;
+}
+
+/// A scan in another place: a hall, no wall of which is near one of the room.
+LaserScan scanElsewhere(const SimulatedDrive& drive, int ms) {
+  const World hall = closedPolygon({{-13.0, -11.0}, {15.0, -11.0}, {15.0, 12.0}, {-13.0, 12.0}});
+  LaserScan scan = simulateScan(hall, SE2(), drive.laser);
+  scan.stamp = at(ms);
+  return scan;
+}
+
+/// A drive of 2 s by the wheels and good scans.
+Driven begun(const SimulatedDrive& drive, const PipelineOptions& options = {}) {
+  Driven driven(drive, options);
+  driven.odometry(0);
+  driven.run(0, 2000);
+  EXPECT_EQ(driven.count(ScanOutcome::kUpdated), 19U);
+  return driven;
+}
+
+/// From one report to the next the wheels alone have moved the estimate, and made it less certain.
+void expectCarriedOnByTheWheels(const SimulatedDrive& drive, const ScanReport& before, const ScanReport& after) {
+  ASSERT_TRUE(before.estimate && after.estimate);
+  const SE2 wheels = between(drive.wheels(milliseconds(before.stamp)), drive.wheels(milliseconds(after.stamp)));
+  const SE2 moved = compose(before.estimate->odom_from_base, wheels);
+  const Eigen::Vector3d off = error(after.estimate->odom_from_base, moved);
+  EXPECT_LT(off.cwiseAbs().maxCoeff(), 2e-4) << "off by " << off.transpose();
+  EXPECT_GT(after.estimate->covariance.determinant(), before.estimate->covariance.determinant());
+}
+
+/// Two seconds of good scans: at most the first two fail, for want of a reference, and the estimate keeps to the truth.
+void expectRecovers(Driven& driven, int from, double tolerance) {
+  const std::size_t reports = driven.reports.size();
+  driven.run(from, from + 2000);
+  ASSERT_EQ(driven.reports.size(), reports + 20);
+  for (std::size_t i = reports + 2; i < driven.reports.size(); ++i) {
+    EXPECT_EQ(driven.reports[i].outcome, ScanOutcome::kUpdated) << i - reports << ": " << driven.reports[i].reason;
+  }
+  const Eigen::Vector3d e = driven.latestError(from + 2000);
+  EXPECT_LT(e.head<2>().norm(), tolerance) << e.transpose();
+  EXPECT_LT(std::abs(e.z()), tolerance) << e.transpose();
+}
+
+// ---- scans that give no displacement --------------------------------------------------------------------------------
+
+void expectUnusableForASecond(float range) {
+  const SimulatedDrive drive;
+  Driven driven = begun(drive);
+  for (int ms = 2020; ms <= 3000; ms += 20) {
+    if (ms % 100 == 20) driven.scan(constantScan(drive, ms - 13, range));
+    driven.odometry(ms);
+  }
+  ASSERT_EQ(driven.count(ScanOutcome::kUnusable), 10U);
+  for (std::size_t i = driven.reports.size() - 10; i < driven.reports.size(); ++i) {
+    EXPECT_THAT(driven.reports[i].reason, testing::HasSubstr("0 of 361 ranges"));
+    EXPECT_FALSE(driven.reports[i].innovation);
+    EXPECT_FALSE(driven.reports[i].new_reference);
+    expectCarriedOnByTheWheels(drive, driven.reports[i - 1], driven.reports[i]);
+  }
+  expectRecovers(driven, 3000, 0.04);
+}
+
+TEST(ScanOdometryFaults, ABlindLaserLeavesItToTheWheels) {
+  expectUnusableForASecond(std::numeric_limits<float>::infinity());
+}
+
+TEST(ScanOdometryFaults, ScansOfNaNLeaveItToTheWheels) {
+  expectUnusableForASecond(std::numeric_limits<float>::quiet_NaN());
+}
+
+TEST(ScanOdometryFaults, AMountThatIsNoPoseMakesTheScanUnusable) {
+  const SimulatedDrive drive;
+  Driven driven = begun(drive);
+  Eigen::Isometry3d mount = Eigen::Isometry3d::Identity();
+  mount.translation().x() = std::numeric_limits<double>::quiet_NaN();
+  driven.pipeline.addScan(drive.scan(2007), mount);
+  driven.odometry(2020);
+  EXPECT_EQ(driven.reports.back().outcome, ScanOutcome::kUnusable);
+  EXPECT_THAT(driven.reports.back().reason, testing::HasSubstr("mount"));
+  expectRecovers(driven, 2020, 0.04);
+}
+
+TEST(ScanOdometryFaults, AnUnusableFirstScanIsNoReference) {
+  const SimulatedDrive drive;
+  Driven driven(drive);
+  driven.odometry(0);
+  driven.scan(constantScan(drive, 7, 0.0F));
+  driven.odometry(20);
+  EXPECT_EQ(driven.reports.back().outcome, ScanOutcome::kUnusable);
+  EXPECT_FALSE(driven.reports.back().new_reference);
+  driven.run(20, 200);
+  EXPECT_EQ(driven.reports.back().outcome, ScanOutcome::kReference);
+}
+
+TEST(ScanOdometryFaults, AScanOfAnotherPlaceLeavesItToTheWheels) {
+  const SimulatedDrive drive;
+  Driven driven = begun(drive);
+  for (const int ms : {2020, 2040, 2060, 2080, 2100}) {
+    if (ms == 2020) driven.scan(scanElsewhere(drive, 2007));
+    driven.odometry(ms);
+  }
+  const ScanReport& report = driven.reports.back();
+  EXPECT_EQ(report.outcome, ScanOutcome::kNoMatch) << toString(report.outcome);
+  EXPECT_EQ(report.reason, toString(report.match.failure));
+  EXPECT_NE(report.match.failure, MatchFailure::kNone);
+  EXPECT_FALSE(report.innovation);
+  EXPECT_FALSE(report.new_reference) << "one failure is none of the reference's";
+  expectCarriedOnByTheWheels(drive, driven.reports[driven.reports.size() - 2], report);
+  expectRecovers(driven, 2100, 0.04);
+}
+
+/// Two scans of another place, and the reference is the second: the way back goes by two more failures.
+TEST(ScanOdometryFaults, FindsBackFromAReferenceInAnotherPlace) {
+  const SimulatedDrive drive;
+  Driven driven = begun(drive);
+  for (int ms = 2020; ms <= 2200; ms += 20) {
+    if (ms % 100 == 20) driven.scan(scanElsewhere(drive, ms - 13));
+    driven.odometry(ms);
+  }
+  EXPECT_EQ(driven.count(ScanOutcome::kNoMatch), 2U);
+  EXPECT_TRUE(driven.reports.back().new_reference);
+  expectRecovers(driven, 2200, 0.06);
+}
+
+// ---- contradictions -------------------------------------------------------------------------------------------------
+
+/// The laser is 0.08 m to the left of where it is taken to be: a displacement that the wheels have not seen.
+TEST(ScanOdometryFaults, ADisplacementBeyondTheGateIsRefused) {
+  const SimulatedDrive drive;
+  PipelineOptions options = trustingTheWheels();
+  options.gate.trust_scans_on_slip = false;
+  Driven driven = begun(drive, options);
+  driven.scan(drive.scanDisplaced(2007, SE2(0, 0.08, 0)));
+  driven.odometry(2020);
+  const ScanReport& report = driven.reports.back();
+  ASSERT_EQ(report.outcome, ScanOutcome::kGated) << toString(report.outcome) << " " << report.reason;
+  ASSERT_TRUE(report.match.displacement && report.innovation);
+  const SE2& displacement = report.match.displacement->reference_from_current;
+  const Eigen::Vector3d off = error(displacement, report.prediction.reference_from_current);
+  EXPECT_NEAR(off.head<2>().norm(), 0.08, 0.02) << off.transpose();
+  EXPECT_NEAR(off.z(), 0.0, 0.02) << off.transpose();
+  EXPECT_GT(report.innovation->nis(), 16.266);  // of χ² with 3 degrees of freedom, 0.1 % lie beyond
+  EXPECT_THAT(report.reason, testing::HasSubstr("normalised innovation squared"));
+  EXPECT_THAT(report.reason, testing::HasSubstr(testing::PrintToString(16.2662)));
+  expectCarriedOnByTheWheels(drive, driven.reports[driven.reports.size() - 2], report);
+  for (int ms = 2040; ms <= 2100; ms += 20) driven.odometry(ms);
+  expectRecovers(driven, 2100, 0.04);
+}
+
+TEST(ScanOdometryFaults, AWiderGateLetsTheSameDisplacementIn) {
+  const SimulatedDrive drive;
+  PipelineOptions options = trustingTheWheels();
+  options.gate.trust_scans_on_slip = false;
+  options.gate.probability = 1.0 - 1e-15;
+  Driven driven = begun(drive, options);
+  driven.scan(drive.scanDisplaced(2007, SE2(0, 0.06, 0)));
+  driven.odometry(2020);
+  EXPECT_EQ(driven.reports.back().outcome, ScanOutcome::kUpdated) << driven.reports.back().reason;
+}
+
+/// The wheels report no motion for 0.6 s, of 0.2 m or more: they spin, or their encoder is stuck.
+constexpr int kSlipFrom = 2000;
+constexpr int kSlipTo = 2600;
+
+SimulatedDrive slippingDrive() {
+  Wheels wheels;
+  wheels.stand_still_from = kSlipFrom;
+  wheels.stand_still_to = kSlipTo;
+  return SimulatedDrive(wheels);
+}
+
+TEST(ScanOdometryFaults, WhereTheWheelsSlipTheScansAreFollowed) {
+  const SimulatedDrive drive = slippingDrive();
+  Driven driven = begun(drive);
+  driven.run(kSlipFrom, 4000);
+  EXPECT_GE(driven.count(ScanOutcome::kSlip), 4U);
+  EXPECT_EQ(driven.count(ScanOutcome::kGated), 0U);
+  for (const ScanReport& report : driven.reports) {
+    const Eigen::Vector3d e = error(report.estimate.value().odom_from_base, drive.truth(milliseconds(report.stamp)));
+    EXPECT_LT(e.head<2>().norm(), 0.04) << "at " << milliseconds(report.stamp) << " ms: " << e.transpose();
+    const bool slips = milliseconds(report.stamp) > kSlipFrom && milliseconds(report.stamp) < kSlipTo + 100;
+    if (!slips) {
+      EXPECT_NE(report.outcome, ScanOutcome::kSlip) << "at " << milliseconds(report.stamp) << " ms";
+    }
+  }
+  const double missed = between(drive.truth(kSlipFrom), drive.truth(kSlipTo)).translation().norm();
+  EXPECT_GT(missed, 0.2) << "the slip is no test";
+}
+
+TEST(ScanOdometryFaults, ScansThatAreNotTrustedOnSlipAreGated) {
+  const SimulatedDrive drive = slippingDrive();
+  PipelineOptions options;
+  options.gate.trust_scans_on_slip = false;
+  Driven driven = begun(drive, options);
+  driven.run(kSlipFrom, kSlipTo);
+  EXPECT_EQ(driven.count(ScanOutcome::kSlip), 0U);
+  EXPECT_GE(driven.count(ScanOutcome::kGated), 1U);
+  for (const ScanReport& report : driven.reports) {
+    if (report.outcome == ScanOutcome::kGated) {
+      EXPECT_THAT(report.reason, testing::HasSubstr("exceeds"));
+    }
+  }
+}
+
+/// A slip is believed only of scans that match well.
+TEST(ScanOdometryFaults, APoorMatchIsNoSlip) {
+  const SimulatedDrive drive = slippingDrive();
+  for (const bool by_overlap : {true, false}) {
+    PipelineOptions options;
+    if (by_overlap) {
+      options.gate.slip_min_overlap = 1.1;
+    } else {
+      options.gate.slip_max_residual = 1e-3;
+    }
+    Driven driven = begun(drive, options);
+    driven.run(kSlipFrom, kSlipTo);
+    EXPECT_EQ(driven.count(ScanOutcome::kSlip), 0U);
+    EXPECT_GE(driven.count(ScanOutcome::kGated), 1U);
+  }
+}
+
+// ---- what scans do not see ------------------------------------------------------------------------------------------
+
+/// Along a corridor the wheels tell the way, and the scans heading and distance to the walls.
+TEST(ScanOdometryFaults, AlongACorridorTheWheelsTellTheWay) {
+  const auto ahead = [](double t) { return SE2(0.5 * t, 0.2, 0.0); };
+  const SimulatedDrive drive(Wheels(), 10000, corridor(), ahead);
+  Driven driven(drive);
+  driven.odometry(0);
+  driven.run(0, 10000);
+  EXPECT_EQ(driven.count(ScanOutcome::kUpdated), 99U);
+  int along_too = 0;  // noise may feign the third direction, but seldom
+  for (const ScanReport& report : driven.reports) {
+    if (report.outcome == ScanOutcome::kReference) continue;
+    ASSERT_TRUE(report.match.displacement) << report.reason;
+    along_too += report.match.displacement->dimension() == 2 ? 0 : 1;
+    EXPECT_EQ(report.innovation.value().residual.size(), report.match.displacement->dimension());
+  }
+  EXPECT_LE(along_too, 1);
+  const Estimate last = driven.pipeline.latest().value();
+  EXPECT_NEAR(last.odom_from_base.x, 1.03 * 5.0, 0.02) << "the wheels' own scale, no less";
+  EXPECT_NEAR(last.odom_from_base.y, 0.0, 0.05);
+  EXPECT_NEAR(last.odom_from_base.yaw, 0.0, 0.02);
+  EXPECT_GT(std::abs(drive.wheels(10000).y), 0.3) << "the wheels are no test";
+  // Along: 0.1 m/√m over 5 m. Across, the scans.
+  EXPECT_NEAR(std::sqrt(last.covariance(0, 0)), 0.1 * std::sqrt(5.15), 0.02);
+  EXPECT_LT(last.covariance(1, 1), 0.1 * last.covariance(0, 0));
+}
+
+}  // namespace
+}  // namespace sckf::test
