@@ -97,7 +97,13 @@ def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
 
 
-def new_figure(rows: int, columns: int, width: float, height: float, **options: object) -> tuple[plt.Figure, np.ndarray]:
+def paragraph(text: str) -> str:
+    """The text on one line, wherever its lines break in the source."""
+    return " ".join(text.split())
+
+
+def new_figure(rows: int, columns: int, width: float, height: float,
+               **options: object) -> tuple[plt.Figure, np.ndarray]:
     plt.rcParams.update({"font.size": 12, "axes.titlesize": 13, "legend.fontsize": 11, "legend.framealpha": 0.85})
     figure, panels = plt.subplots(rows, columns, figsize=(width, height), squeeze=False, **options)
     for panel in panels.flat:

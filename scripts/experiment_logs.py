@@ -8,10 +8,10 @@ from typing import Dict, List, Optional
 import numpy as np
 
 from experiment_base import (COLOURS, GREY, NAMES, TRUTH, ExperimentError, Result, Setting, markdown_table, new_figure,
-                             read_table, run, save_figure)
+                             paragraph, read_table, run, save_figure)
 from recording import Recording, Topics, read_recording
-from revisit import Revisit, find_revisits, transformed
-from trajectory import Trajectory, TrajectoryError, compose, drift, read_tum, sample, wrap
+from revisit import MIN_OVERLAP, Revisit, Surface, align, candidates, transformed
+from trajectory import Trajectory, TrajectoryError, between, compose, drift, read_tum, sample, wrap
 
 MALAGA = Path("/usr/share/mrpt/datasets/2006-01ENE-21-SENA_Telecom Faculty_one_loop_only.rawlog")
 FUSING = ("sckf", "sckf_nc", "pseudo_absolute", "dead_reckoning")
@@ -87,9 +87,16 @@ def end_error(revisit: Revisit, stamps: np.ndarray, estimates: Estimates) -> End
 
 
 def last_revisit(recording: Recording, estimates: Estimates) -> Optional[Revisit]:
-    poses, _ = sample(estimates.trajectory, recording.stamps)
-    revisits = find_revisits(recording.clouds, poses)
-    return revisits[-1] if revisits else None
+    """As the last of revisit.find_revisits(), found from the end."""
+    poses, covered = sample(estimates.trajectory, recording.stamps)
+    scans = np.flatnonzero(covered)
+    way = Trajectory(recording.stamps[scans], poses[scans]).way
+    for first, second in reversed(list(candidates(poses[scans], way))):
+        guess = between(poses[scans[first]], poses[scans[second]])
+        found = align(Surface(recording.clouds[scans[first]]), recording.clouds[scans[second]], guess)
+        if found.overlap >= MIN_OVERLAP:
+            return Revisit(int(scans[first]), int(scans[second]), found.pose)
+    return None
 
 
 def mean_nees(reference: Trajectory, estimates: Estimates) -> float:
@@ -122,7 +129,7 @@ def four_methods(setting: Setting) -> Result:
     if revisit:
         result.text += _tell_end_errors(result, revisit, recording.stamps, {"every_scan": paper, "kept": kept})
     else:
-        result.text.append("The robot does not come back to a place where it was: there is no error at the end to tell.")
+        result.text.append("The robot does not come back to a place where it was: no error at the end is known.")
     if setting.reference:
         result.text.append(_tell_reference(result, setting.reference, {"every_scan": paper, "kept": kept}))
     return result
@@ -145,10 +152,11 @@ def _tell_end_errors(result: Result, revisit: Revisit, stamps: np.ndarray,
             cells.append(_form(error.x, error.y, np.degrees(error.yaw), percent))
         rows.append([*cells, _form(*PAPER[method])])
     order = sorted(FUSING, key=lambda m: result.numbers[f"{m}_every_scan_percent"])
-    return ["Error at the end (x, y, yaw, share of the way). The true end is not known, but the robot passes a place a "
-            "second time: ICP of the last scan that it takes there onto one of the first pass, "
-            f"{between_passes:.0f} m of way before, tells the pose between the two, and the error is what the trajectory "
-            "says of it less what ICP says, in the axes of odom. All are held against the same pair of scans.",
+    return [paragraph(f"""
+        Error at the end (x, y, yaw, share of the way). The true end is not known, but the robot passes a place a
+        second time: ICP of the last scan that it takes there onto one of the first pass, {between_passes:.0f} m of
+        way before, tells the pose between the two. The error is what the trajectory says of it less what ICP says,
+        in the axes of odom. All are held against the same pair of scans."""),
             markdown_table(["", "reference at every scan (the paper's)", "references kept (the package's default)",
                             "the paper, on its own log of 165 m"], rows),
             "Order of the errors with a reference at every scan: " + ", ".join(NAMES[method] for method in order) + "."]
@@ -225,14 +233,13 @@ def displacement_only(setting: Setting) -> Result:
         result.numbers[f"share_below_{component}"] = float(np.mean(both[0][moved] <= both[1][moved] * (1 + 1e-9)))
         ratios.append("{:.2f} and {:.2f} ({})".format(result.numbers[f"ratio_{component}"],
                                                       result.numbers[f"median_ratio_{component}"], component))
-    result.text = [
-        f"Log: `{bag.name}`. Every scan is matched to the one before; wheels guide the search and fill in what scans do not "
-        f"see. The variance with C, as a share of that without, at the end and as the median over the way: "
-        f"{', '.join(ratios)}. A match of little overlap, whose error is its own, adds the same to both. How much C takes "
-        "away depends on what "
-        "the error of a displacement consists of: C holds what two displacements share, the range noise of one scan; the "
-        "matching noise, that two scans do not meet the same points, they do not share. The map is all scans, drawn where "
-        "the estimate puts them; it takes no part in the estimation."]
+    result.text = [paragraph(f"""
+        Log: `{bag.name}`. Every scan is matched to the one before; wheels guide the search and fill in what scans
+        do not see. The variance with C, as a share of that without, at the end and as the median over the way:
+        {', '.join(ratios)}. A match of little overlap, whose error is its own, adds the same to both. How much C
+        takes away depends on what the error of a displacement consists of: C holds what two displacements share,
+        the range noise of one scan; the matching noise, that two scans do not meet the same points, they do not
+        share. The map is all scans, drawn where the estimate puts them; it takes no part in the estimation.""")]
     return result
 
 

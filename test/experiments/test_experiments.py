@@ -1,0 +1,173 @@
+#!/usr/bin/python3
+"""The experiments of the paper, all in one run with few simulated robots: the numbers that matter, and the report.
+
+The programs of the package are looked for in the folder SCKF_BIN_DIR, or as scripts/experiment does.
+"""
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+from typing import Dict, List
+
+import numpy as np
+
+SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
+sys.path.insert(0, str(SCRIPTS))
+from experiment_base import ExperimentError, find_program  # noqa: E402
+from experiment_logs import Estimates, end_error, mean_nees  # noqa: E402
+from revisit import Revisit  # noqa: E402
+from trajectory import Trajectory  # noqa: E402
+
+RUNS = 24
+FIGURES = ("four_methods", "four_methods_covariance", "line_matching", "line_matching_nees", "line_matching_ratios",
+           "displacement_only", "displacement_only_covariance", "one_dimension", "visual_odometry", "complexity")
+
+
+def experiment(arguments: List[str], **options: object) -> subprocess.CompletedProcess:
+    environment = {key: value for key, value in os.environ.items() if key != "DISPLAY"}
+    folder = os.environ.get("SCKF_BIN_DIR")
+    return subprocess.run([str(SCRIPTS / "experiment"), *arguments, *(["--bin-dir", folder] if folder else [])],
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True, check=False,
+                          env=environment, **options)
+
+
+class AllExperiments(unittest.TestCase):
+    folder: tempfile.TemporaryDirectory
+    report: str
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.folder = tempfile.TemporaryDirectory()
+        done = experiment(["all", "--output", cls.folder.name, "--runs", str(RUNS)])
+        if done.returncode != 0:
+            raise AssertionError(done.stdout)
+        cls.report = (Path(cls.folder.name) / "report.md").read_text(encoding="utf-8")
+
+    @classmethod
+    def tearDownClass(cls) -> None:
+        cls.folder.cleanup()
+
+    def numbers(self, name: str) -> Dict[str, float]:
+        return json.loads((Path(self.folder.name) / f"{name}.json").read_text())
+
+    def test_report_has_every_figure_the_command_and_the_versions(self) -> None:
+        self.assertEqual(sorted(re.findall(r"\]\((\w+)\.png\)", self.report)), sorted(FIGURES))
+        for figure in FIGURES:
+            self.assertGreater((Path(self.folder.name) / f"{figure}.png").stat().st_size, 10000, figure)
+        self.assertIn(f"experiment all --output {self.folder.name} --runs {RUNS}", self.report)
+        self.assertRegex(self.report, r"Versions: sckf_odometry \d+\.\d+\.\d+.*numpy \d")
+
+    def test_four_methods_tells_the_order_of_the_errors(self) -> None:
+        n = self.numbers("four_methods")
+        for kind in ("every_scan", "kept"):
+            for method in ("sckf", "sckf_nc", "pseudo_absolute"):
+                self.assertLess(n[f"{method}_{kind}_percent"], 0.5 * n[f"dead_reckoning_{kind}_percent"], method)
+        names = {"sckf": "SC-KF", "sckf_nc": "SC-KF-NC", "pseudo_absolute": "pseudo-absolute",
+                 "dead_reckoning": "dead reckoning"}
+        order = sorted(names, key=lambda method: n[f"{method}_every_scan_percent"])
+        self.assertIn("at every scan: " + ", ".join(names[method] for method in order), self.report)
+        self.assertIn("0.50 m, 0.44 m, -0.11°, 0.40 %", self.report, "the paper's own figures")
+
+    def test_line_matching_covariance_of_the_sckf_fits(self) -> None:
+        n = self.numbers("line_matching")
+        self.assertTrue(n["nees_low"] < n["sckf_nees"] < n["nees_high"], n)
+        self.assertGreater(n["sckf_nees_share_in_band"], 0.7, "errors at neighbouring scans are much the same error")
+        for axis in ("x", "y", "yaw"):
+            self.assertGreater(n[f"sckf_inside_{axis}"], 0.98)
+            self.assertTrue(0.7 < n[f"sckf_bound_{axis}"] < 1.5, axis)
+
+    def test_line_matching_covariance_of_the_sckf_nc_is_far_too_large(self) -> None:
+        n = self.numbers("line_matching")
+        self.assertLess(n["sckf_nc_nees"], 0.85 * n["nees_low"])
+        self.assertGreater(n["sckf_nc_bound_y"], 1.5)
+        self.assertGreater(n["sckf_nc_bound_yaw"], 4.0)
+        self.assertLess(n["rms_ratio_y"], 0.9)
+        self.assertLess(n["rms_ratio_yaw"], 1.0)
+
+    def test_displacement_only_covariance_is_smaller_with_c(self) -> None:
+        n = self.numbers("displacement_only")
+        for axis in ("x", "y", "yaw"):
+            self.assertLess(n[f"ratio_{axis}"], 1.0, axis)
+            self.assertGreater(n[f"share_below_{axis}"], 0.99, axis)
+
+    def test_one_dimension_is_monotonic_with_c_and_has_a_valley_without(self) -> None:
+        n = self.numbers("one_dimension")
+        self.assertEqual(n["monotonic_with_c"], 1.0)
+        self.assertAlmostEqual(n["valley_without_c"], 5.0, delta=0.5)
+        self.assertLess(n["largest_deviation_from_curve"], 0.02)
+        self.assertGreater(n["share_of_intervals_that_hold_the_filter"], 0.7)
+
+    def test_visual_odometry_is_monotonic_with_c_and_has_a_valley_without(self) -> None:
+        n = self.numbers("visual_odometry")
+        for part in ("position", "attitude"):
+            self.assertEqual(n[f"{part}_monotonic_with_c"], 1.0, part)
+            self.assertTrue(0.3 < n[f"{part}_valley_without_c"] < 3.0, part)
+            self.assertTrue(0.7 < n[f"{part}_scatter_over_covariance"] < 1.4, part)
+            self.assertLess(n[f"{part}_scatter_over_covariance_without_c_dense"], 0.8, part)
+
+    def test_complexity_is_linear_constant_and_quadratic(self) -> None:
+        n = self.numbers("complexity")  # timings: the bounds tell the three apart, and no more
+        self.assertTrue(0.5 < n["slope_sckf"] < 1.5, n)
+        self.assertLess(abs(n["slope_sckf_nc"]), 0.4, n)
+        self.assertTrue(1.5 < n["slope_dense"] < 2.7, n)
+
+
+class CommandLine(unittest.TestCase):
+    def test_refuses_what_there_is_not(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            for arguments, told in ((["five_methods", "--output", folder], "five_methods"),
+                                    (["four_methods", "--output", folder, "--range-std", "1"], "--range-std"),
+                                    (["complexity", "--output", folder, "--no-such"], "no-such"),
+                                    (["four_methods", "--output", folder, "--bag", "/no/such.bag"], "such.bag")):
+                done = experiment(arguments)
+                self.assertNotEqual(done.returncode, 0, arguments)
+                self.assertIn(told, done.stdout)
+                self.assertNotIn("Traceback", done.stdout)
+
+    def test_a_parameter_changes_the_result(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            variances = []
+            for std in ("0.2", "0.4"):
+                done = experiment(["one_dimension", "--output", folder, "--runs", "2", "--distance-std", std])
+                self.assertEqual(done.returncode, 0, done.stdout)
+                table = np.genfromtxt(Path(folder) / "one_dimension_simulated.csv", delimiter=",", names=True)
+                variances.append(table["with_c"])
+        np.testing.assert_allclose(variances[1], 4.0 * variances[0], rtol=1e-6)
+
+    def test_says_where_it_looked_for_a_program(self) -> None:
+        with self.assertRaisesRegex(ExperimentError, "/no/such/folder.*--bin-dir"):
+            find_program("replay", Path("/no/such/folder"))
+
+
+class Measures(unittest.TestCase):
+    def test_end_error_is_the_one_on_paper(self) -> None:
+        """Scans: the second pass ends 1 m ahead of the first. The estimate: 0.3 m further, 0.2 m left, 0.1 rad."""
+        poses = np.array([[2.0, 1.0, math.pi / 2], [9.0, 9.0, 0.0], [1.8, 2.3, math.pi / 2 + 0.1]])
+        estimates = Estimates(np.array([0.0, 1.0, 2.0]), poses, np.tile(np.eye(3), (3, 1, 1)))
+        error = end_error(Revisit(0, 2, np.array([1.0, 0.0, 0.0])), estimates.stamps, estimates)
+        np.testing.assert_allclose([error.x, error.y, error.yaw], [-0.2, 0.3, 0.1], atol=1e-12)
+
+    def test_nees_is_three_where_the_covariance_is_right(self) -> None:
+        random = np.random.default_rng(1)
+        count = 4000
+        covariance = np.array([[0.04, 0.01, 0.0], [0.01, 0.02, 0.001], [0.0, 0.001, 0.0004]])
+        truth = np.column_stack((np.linspace(0.0, 50.0, count), np.zeros(count), np.zeros(count)))
+        estimate = truth + random.multivariate_normal(np.zeros(3), covariance, count)
+        estimate[0] = truth[0]
+        stamps = 0.1 * np.arange(count)
+        estimates = Estimates(stamps, estimate, np.tile(covariance, (count, 1, 1)))
+        turned = np.array([5.0, -3.0, 1.0])  # a reference in a frame of its own
+        cos, sin = math.cos(1.0), math.sin(1.0)
+        reference = np.column_stack((turned[0] + cos * truth[:, 0], turned[1] + sin * truth[:, 0], np.full(count, 1.0)))
+        self.assertAlmostEqual(mean_nees(Trajectory(stamps, reference), estimates), 3.0, delta=0.15)
+
+
+if __name__ == "__main__":
+    unittest.main()
