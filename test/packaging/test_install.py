@@ -25,7 +25,8 @@ class Install(unittest.TestCase):
     def setUpClass(cls):
         # catkin fixes the prefix when it configures; scripts/setup puts it into the build.
         cls.prefix = os.path.join(os.path.realpath(BUILD), 'install')
-        cache = open(os.path.join(BUILD, 'CMakeCache.txt')).read()
+        with open(os.path.join(BUILD, 'CMakeCache.txt'), encoding='utf-8') as file:
+            cache = file.read()
         if 'CMAKE_INSTALL_PREFIX:PATH=%s\n' % cls.prefix not in cache:
             raise unittest.SkipTest('not configured to install into %s' % cls.prefix)
         shutil.rmtree(cls.prefix, ignore_errors=True)
