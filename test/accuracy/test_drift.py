@@ -1,0 +1,163 @@
+#!/usr/bin/python3
+"""Whole logs through replay, one configuration for all: how far the estimate drifts, beside what is allowed.
+
+Always the two logs that come with MRPT; and the recorded ones in the folder that the environment variable SCKF_DATA names,
+NAME.bag with its reference trajectory NAME.tum. SCKF_BIN_DIR is the folder of the programs under test. At the end a table
+says what was measured, beside the bounds and beside the wheels alone: run with -s (pytest) or as it is to see it.
+"""
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+from dataclasses import dataclass
+from pathlib import Path
+from typing import List, Optional
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "scripts"))
+from recording import read_recording  # noqa: E402
+from revisit import closure, find_revisits  # noqa: E402
+from trajectory import Trajectory, drift, read_tum, sample  # noqa: E402
+
+BIN_DIR = Path(os.environ.get("SCKF_BIN_DIR", ROOT / "build" / "devel" / "lib" / "sckf_odometry"))
+DATASETS = Path("/usr/share/mrpt/datasets")
+SIMULATED = DATASETS / "graphslam-engine-demos" / "action_observations_map"
+MALAGA = DATASETS / "2006-01ENE-21-SENA_Telecom Faculty_one_loop_only.rawlog"
+COVERAGE = 0.98  # share of the reference's poses that the estimate must cover: scans that are left out show no drift
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Of a log: two numbers with the units that the log is measured in."""
+    translation: float
+    rotation: float
+
+
+@dataclass(frozen=True)
+class Row:
+    log: str
+    unit: str
+    wheels: Figures
+    measured: Figures
+    bound: Figures
+
+
+def run(program: str, *arguments: str | Path) -> None:
+    done = subprocess.run([str(BIN_DIR / program), *map(str, arguments)], stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT, text=True, check=False)
+    if done.returncode != 0:
+        raise RuntimeError(f"{program} ended with {done.returncode}: {done.stdout}")
+
+
+def recorded(name: str) -> Path:
+    """The log's bag; skips the test where it is not at hand."""
+    folder = os.environ.get("SCKF_DATA")
+    if not folder:
+        raise unittest.SkipTest("SCKF_DATA does not name the folder of the recorded logs")
+    bag = Path(folder) / f"{name}.bag"
+    for file in (bag, bag.with_suffix(".tum")):
+        if not file.is_file():
+            raise unittest.SkipTest(f"{file} is missing")
+    return bag
+
+
+def installed(path: Path) -> Path:
+    if not path.is_file():
+        raise unittest.SkipTest(f"{path} is missing: it comes with Debian's mrpt-common")
+    return path
+
+
+class DriftTest(unittest.TestCase):
+    folder: tempfile.TemporaryDirectory[str]
+    table: List[Row] = []
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.folder = tempfile.TemporaryDirectory()
+
+    @classmethod
+    def tearDownClass(cls) -> None:
+        cls.folder.cleanup()
+        print(f"\n{'log':14}{'wheels alone':>24}{'measured':>24}{'at most':>24}")
+        for row in cls.table:
+            cells = [f"{each.translation:.2f} {row.unit.replace(',', f', {each.rotation:.3f}')}"
+                     for each in (row.wheels, row.measured, row.bound)]
+            print(f"{row.log:14}" + "".join(f"{cell:>24}" for cell in cells))
+
+    def path(self, name: str) -> Path:
+        return Path(self.folder.name) / name
+
+    def replayed(self, bag: Path, method: Optional[str] = None) -> Trajectory:
+        output = self.path("trajectory.tum")
+        run("replay", bag, "--trajectory", output, *(["--method", method] if method else []))
+        return read_tum(output)
+
+    def drifted(self, bag: Path, reference: Trajectory, method: Optional[str] = None) -> Figures:
+        result = drift(reference, self.replayed(bag, method))
+        self.assertGreaterEqual(result.covered, COVERAGE * result.reference_poses)
+        return Figures(result.translation_percent, result.rotation_deg_per_m)
+
+    def check(self, row: Row) -> None:
+        self.table.append(row)
+        self.assertLessEqual(row.measured.translation, row.bound.translation, row)
+        self.assertLessEqual(row.measured.rotation, row.bound.rotation, row)
+        self.assertGreater(row.wheels.translation, 2.0 * row.measured.translation, row)
+        self.assertGreater(row.wheels.rotation, 2.0 * row.measured.rotation, row)
+
+    def check_drift(self, log: str, bag: Path, tum: Path, percent: float, deg_per_m: float) -> None:
+        reference = read_tum(tum)
+        self.check(Row(log, "%, °/m", self.drifted(bag, reference, "dead_reckoning"), self.drifted(bag, reference),
+                       Figures(percent, deg_per_m)))
+
+    def check_recorded(self, log: str, percent: float, deg_per_m: float) -> None:
+        bag = recorded(log)
+        self.check_drift(log, bag, bag.with_suffix(".tum"), percent, deg_per_m)
+
+    def test_intel(self) -> None:
+        self.check_recorded("intel", 1.1, 0.09)
+
+    def test_intel_raw(self) -> None:
+        self.check_recorded("intel-raw", 1.9, 0.115)
+
+    def test_aces(self) -> None:
+        self.check_recorded("aces", 2.0, 0.12)
+
+    def test_freiburg_079(self) -> None:
+        self.check_recorded("freiburg-079", 1.3, 0.13)
+
+    def test_simulated_log_of_mrpt(self) -> None:
+        bag, tum = self.path("simulated.bag"), self.path("simulated.tum")
+        run("rawlog_to_bag", installed(SIMULATED / "simul.rawlog"), bag, "--ground-truth",
+            installed(SIMULATED / "simul.rawlog.GT.txt"), "--tum", tum)
+        self.check_drift("simulated", bag, tum, 1.2, 0.03)
+
+    def test_malaga_closes_on_its_second_pass(self) -> None:
+        """No truth here, but the robot runs over its own way again: its scans fall on those of the first pass."""
+        bag = self.path("malaga.bag")
+        run("rawlog_to_bag", installed(MALAGA), bag)
+        recording = read_recording(str(bag))
+        poses = {}
+        for method in ("sckf", "dead_reckoning"):
+            poses[method], covered = sample(self.replayed(bag, method), recording.stamps)
+            self.assertGreaterEqual(covered.mean(), COVERAGE)
+            inside = covered if method == "sckf" else inside & covered
+        clouds = [cloud for cloud, use in zip(recording.clouds, inside) if use]
+        poses = {method: each[inside] for method, each in poses.items()}
+        revisits = find_revisits(clouds, poses["sckf"])
+        self.assertGreater(len(revisits), 20)
+
+        def median(method: str) -> Figures:
+            closures = [closure(revisit, clouds, poses[method]) for revisit in revisits]
+            return Figures(float(np.median([each.translation for each in closures])),
+                           float(np.degrees(np.median([each.rotation for each in closures]))))
+
+        self.check(Row("malaga", "m,°", median("dead_reckoning"), median("sckf"), Figures(0.35, 1.0)))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,223 @@
+#!/usr/bin/python3
+"""replay, run as a person runs it: what it writes, that it writes the same every time, and what it says of wrong input.
+
+SCKF_BIN_DIR is the folder of the programs under test.
+"""
+from __future__ import annotations
+
+import csv
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+from typing import Dict, List
+
+import numpy as np
+import rosbag
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "test" / "ros"), str(ROOT / "scripts")]
+import simulated_bag  # noqa: E402
+from trajectory import Trajectory, between, read_tum  # noqa: E402
+
+REPLAY = Path(os.environ.get("SCKF_BIN_DIR", ROOT / "build" / "devel" / "lib" / "sckf_odometry")) / "replay"
+DURATION = 12.0
+COLUMNS = ("stamp,x,y,yaw,var_x,cov_xy,cov_xyaw,var_y,cov_yyaw,var_yaw,"
+           "reference_stamp,displacement_x,displacement_y,displacement_yaw,dimension,"
+           "innovation_1,innovation_2,innovation_3,nis,pairs,overlap,residual_rms,new_reference,outcome,reason").split(",")
+
+
+class ReplayTest(unittest.TestCase):
+    folder: tempfile.TemporaryDirectory[str]
+    bag: Path
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.bag = Path(cls.folder.name) / "drive.bag"
+        simulated_bag.write(str(cls.bag), duration=DURATION)
+
+    @classmethod
+    def tearDownClass(cls) -> None:
+        cls.folder.cleanup()
+
+    def path(self, name: str) -> Path:
+        return Path(self.folder.name) / name
+
+    def run_replay(self, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+        command = [str(each) for each in (REPLAY, *arguments)]
+        return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+
+    def replay(self, *arguments: str | Path) -> str:
+        done = self.run_replay(*arguments)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done.stdout
+
+    def refused(self, *arguments: str | Path) -> str:
+        """What it says; afterwards there is neither a file with the output's name nor a part of one."""
+        output = self.path("refused.tum")
+        done = self.run_replay(*arguments, "--trajectory", output)
+        self.assertGreater(done.returncode, 0, "negative: it crashed; zero: it was content\n" + done.stdout)
+        self.assertRegex(done.stderr, r"(?m)^replay: ")
+        self.assertFalse(output.exists(), output)
+        return done.stderr
+
+    def trajectory(self, *arguments: str | Path) -> Trajectory:
+        output = self.path("trajectory.tum")
+        self.replay(self.bag, "--trajectory", output, *arguments)
+        return read_tum(output)
+
+    def table(self, *arguments: str | Path) -> List[Dict[str, str]]:
+        output = self.path("table.csv")
+        self.replay(self.bag, "--csv", output, *arguments)
+        with open(output, newline="", encoding="utf-8") as file:
+            rows = csv.reader(file)
+            self.assertEqual(next(rows), COLUMNS)
+            table = list(rows)
+        self.assertTrue(all(len(row) == len(COLUMNS) for row in table))
+        return [dict(zip(COLUMNS, row)) for row in table]
+
+    def end_error(self, trajectory: Trajectory) -> np.ndarray:
+        return between(simulated_bag.true_trajectory(trajectory.stamps[-1:])[0], trajectory.poses[-1])
+
+    # ---- what it writes
+
+    def test_the_trajectory_has_every_scan_and_is_right(self) -> None:
+        scans = [stamp for topic, _, stamp in simulated_bag.messages(DURATION) if topic == "/scan"]
+        trajectory = self.trajectory()
+        np.testing.assert_allclose(trajectory.stamps, scans, rtol=0.0, atol=1e-6)
+        off = self.end_error(trajectory)
+        self.assertLess(math.hypot(off[0], off[1]), 0.05, off)
+        self.assertLess(abs(off[2]), 0.02, off)
+
+    def test_the_table_tells_of_every_scan(self) -> None:
+        trajectory = self.trajectory()
+        table = self.table()
+        self.assertEqual(len(table), len(trajectory.stamps))
+        self.assertEqual(table[0]["outcome"], "reference")
+        self.assertEqual(table[0]["new_reference"], "1")
+        self.assertEqual(table[0]["nis"], "")
+        for row, stamp, pose in zip(table, trajectory.stamps, trajectory.poses):
+            self.assertAlmostEqual(float(row["stamp"]), stamp, places=6)
+            np.testing.assert_allclose([float(row[name]) for name in ("x", "y")], pose[:2], rtol=0.0, atol=1e-8)
+            covariance = np.array([[float(row[name]) for name in names] for names in (
+                ("var_x", "cov_xy", "cov_xyaw"), ("cov_xy", "var_y", "cov_yyaw"), ("cov_xyaw", "cov_yyaw", "var_yaw"))])
+            self.assertGreater(np.linalg.eigvalsh(covariance).min(), -1e-12, covariance)
+        for row in table[1:]:
+            self.assertEqual(row["outcome"], "updated", row["reason"])
+            self.assertEqual(row["reason"], "")
+            self.assertEqual(row["dimension"], "3")
+            self.assertLess(float(row["reference_stamp"]), float(row["stamp"]))
+            self.assertGreaterEqual(float(row["nis"]), 0.0)
+            self.assertGreater(int(row["pairs"]), 100)
+            self.assertTrue(0.5 < float(row["overlap"]) <= 1.0, row["overlap"])
+            for name in COLUMNS[11:19]:
+                self.assertTrue(math.isfinite(float(row[name])), name)
+
+    def test_twice_the_same_bag_gives_the_same_bytes(self) -> None:
+        written = []
+        for run in ("1", "2"):
+            files = [self.path(f"run{run}.{kind}") for kind in ("tum", "csv")]
+            self.replay(self.bag, "--trajectory", files[0], "--csv", files[1])
+            written.append([file.read_bytes() for file in files])
+        self.assertEqual(written[0], written[1])
+        self.assertGreater(len(written[0][0]), 1000)
+
+    def test_it_says_how_many_scans_and_how_fast(self) -> None:
+        scans = len(self.trajectory().stamps)
+        said = self.replay(self.bag, "--csv", self.path("any.csv"))
+        self.assertRegex(said, rf"(?m)^{scans} scans, 1 reference, {scans - 1} updated$")
+        self.assertRegex(said, r"time of a scan: median [0-9.]+ ms")
+        self.assertRegex(said, r"[0-9]+ times real time")
+
+    # ---- options
+
+    def test_the_method_changes_the_estimate(self) -> None:
+        wheels = self.trajectory("--method", "dead_reckoning")
+        fused = self.trajectory("--method", "sckf")
+        self.assertLess(np.linalg.norm(self.end_error(fused)[:2]), 0.5 * np.linalg.norm(self.end_error(wheels)[:2]))
+
+    def test_the_method_of_the_command_line_stands_above_that_of_the_file(self) -> None:
+        params = self.path("method.yaml")
+        params.write_text("method: sckf\n", encoding="utf-8")
+        by_both = self.trajectory("--params", params, "--method", "dead_reckoning")
+        wheels = self.trajectory("--method", "dead_reckoning")
+        np.testing.assert_array_equal(by_both.poses, wheels.poses)
+
+    def test_parameters_are_read(self) -> None:
+        params = self.path("every_scan.yaml")
+        params.write_text("kf_dist_linear: 0.0\nkf_dist_angular: 0.0\n", encoding="utf-8")
+        self.assertTrue(all(row["new_reference"] == "1" for row in self.table("--params", params)))
+        self.assertFalse(all(row["new_reference"] == "1" for row in self.table()))
+
+    def test_the_packages_own_parameter_file_states_the_defaults(self) -> None:
+        by_file = self.trajectory("--params", ROOT / "config" / "sckf_odometry.yaml")
+        np.testing.assert_array_equal(by_file.poses, self.trajectory().poses)
+
+    def test_other_topics(self) -> None:
+        renamed = self.path("renamed.bag")
+        with rosbag.Bag(str(self.bag)) as source, rosbag.Bag(str(renamed), "w") as target:
+            for topic, message, stamp in source.read_messages():
+                target.write({"/scan": "/front/scan", "/odom": "/wheels"}.get(topic, topic), message, stamp)
+        output = self.path("renamed.tum")
+        self.replay(renamed, "--trajectory", output, "--scan-topic", "/front/scan", "--odom-topic", "/wheels")
+        np.testing.assert_array_equal(read_tum(output).poses, self.trajectory().poses)
+
+    # ---- wrong input
+
+    def test_a_bad_parameter_is_refused_by_name_value_and_range(self) -> None:
+        params = self.path("bad.yaml")
+        params.write_text("gate_probability: 1.5\n", encoding="utf-8")
+        said = self.refused(self.bag, "--params", params)
+        self.assertIn("gate_probability", said)
+        self.assertIn("1.5", said)
+
+    def test_an_unknown_parameter_is_named(self) -> None:
+        params = self.path("unknown.yaml")
+        params.write_text("kf_dist_linaer: 1.0\n", encoding="utf-8")
+        done = self.run_replay(self.bag, "--trajectory", self.path("unknown.tum"), "--params", params)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("kf_dist_linaer", done.stderr)
+
+    def test_a_parameter_file_that_is_missing_or_no_yaml_is_named(self) -> None:
+        self.assertIn("nowhere.yaml", self.refused(self.bag, "--params", self.path("nowhere.yaml")))
+        params = self.path("broken.yaml")
+        params.write_text("method: [sckf\n", encoding="utf-8")
+        self.assertIn("broken.yaml", self.refused(self.bag, "--params", params))
+
+    def test_an_unknown_method_is_refused_with_the_known_ones(self) -> None:
+        said = self.refused(self.bag, "--method", "kalman")
+        self.assertIn("kalman", said)
+        self.assertIn("sckf_nc", said)
+
+    def test_a_missing_bag_is_named(self) -> None:
+        self.assertIn("nowhere.bag", self.refused(self.path("nowhere.bag")))
+
+    def test_a_file_that_is_no_bag_is_refused(self) -> None:
+        text = self.path("text.bag")
+        text.write_text("not a bag\n", encoding="utf-8")
+        self.refused(text)
+
+    def test_a_topic_without_scans_is_named(self) -> None:
+        self.assertIn("/front/scan", self.refused(self.bag, "--scan-topic", "/front/scan"))
+
+    def test_an_output_that_cannot_be_written_is_named(self) -> None:
+        done = self.run_replay(self.bag, "--trajectory", self.path("no_folder") / "out.tum")
+        self.assertGreater(done.returncode, 0)
+        self.assertIn("no_folder", done.stderr)
+
+    def test_a_wrong_call_is_refused(self) -> None:
+        for arguments in ((), (self.bag,), (self.bag, "--nonsense")):
+            done = self.run_replay(*arguments)
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertRegex(done.stderr, "^replay: ")
+
+    def test_it_explains_itself(self) -> None:
+        self.assertIn("usage: replay BAG", self.replay("--help"))
+
+
+if __name__ == "__main__":
+    unittest.main()
