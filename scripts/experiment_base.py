@@ -67,6 +67,7 @@ def find_program(name: str, bin_dir: Optional[Path]) -> Path:
     if not bin_dir:
         prefixes = os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep)
         folders += [Path(prefix) / "lib" / PACKAGE for prefix in prefixes if prefix]
+    folders = list(dict.fromkeys(folders))
     for folder in folders:
         if os.access(folder / name, os.X_OK):
             return folder / name

@@ -223,7 +223,7 @@ def complexity(setting: Setting) -> Result:
         panel.plot(measured["ranges"], 1e3 * measured[name], color=colour, marker=marker,
                    label=f"{label}: slope {slope:.2f} (M from {half['ranges'][0]:.0f} to {half['ranges'][-1]:.0f})")
     panel.set(xlabel="ranges of a scan, M", ylabel="time of one update [ms]", xscale="log", yscale="log",
-              ylim=(None, 5e4 * table["sckf"].max()))  # room for the legend
+              ylim=(None, 5e4 * table["dense"].max()))  # room for the legend
     panel.legend(loc="upper left")
     result.figures = [save_figure(figure, setting, "complexity.png")]
     result.text = [paragraph(f"""

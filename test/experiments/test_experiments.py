@@ -25,7 +25,7 @@ from experiment_logs import Estimates, end_error, mean_nees  # noqa: E402
 from revisit import Revisit  # noqa: E402
 from trajectory import Trajectory  # noqa: E402
 
-RUNS = 24
+RUNS = 20
 FIGURES = ("four_methods", "four_methods_covariance", "line_matching", "line_matching_nees", "line_matching_ratios",
            "displacement_only", "displacement_only_covariance", "one_dimension", "visual_odometry", "complexity")
 
