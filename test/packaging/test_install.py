@@ -11,8 +11,10 @@ BUILD = os.environ.get('SCKF_BUILD_DIR', '')
 HERE = os.path.dirname(os.path.abspath(__file__))
 
 
-def run(*command, **options) -> str:
-    result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **options)
+def run(*command) -> str:
+    """In a shell as a login finds it, without the devel space that the tests run in."""
+    environment = {'PATH': '/usr/bin:/bin', 'HOME': tempfile.gettempdir()}
+    result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment)
     if result.returncode != 0:
         raise AssertionError('%s\n%s' % (' '.join(command), result.stdout[-4000:]))
     return result.stdout
@@ -33,8 +35,7 @@ class Install(unittest.TestCase):
         run('cmake', '--install', BUILD)
 
     def in_the_installed_space(self, command: str) -> str:
-        environment = {'PATH': '/usr/bin:/bin', 'HOME': self.prefix}
-        return run('bash', '-c', '. %s/setup.bash && %s' % (self.prefix, command), env=environment)
+        return run('bash', '-c', '. %s/setup.bash && %s' % (self.prefix, command))
 
     def test_everything_is_there(self):
         share = 'share/sckf_odometry/'
