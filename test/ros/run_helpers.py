@@ -38,11 +38,14 @@ def wait_until(condition, what, timeout=TIMEOUT):
         time.sleep(0.05)
 
 
+def subscribers(topic):
+    """How many nodes subscribe to a topic, whether anybody publishes it or not."""
+    state = rosgraph.Master(rospy.get_name()).getSystemState()[1]
+    return sum(len(nodes) for name, nodes in state if name == rospy.resolve_name(topic))
+
+
 def wait_for_subscriber(topic):
-    """Until somebody subscribes to a topic that nobody need publish yet."""
-    master = rosgraph.Master(rospy.get_name())
-    topic = rospy.resolve_name(topic)
-    wait_until(lambda: topic in [name for name, _ in master.getSystemState()[1]], 'a subscriber to ' + topic)
+    wait_until(lambda: subscribers(topic) > 0, 'a subscriber to ' + topic)
 
 
 def play(bag, rate, clock=True):
@@ -149,7 +152,8 @@ class Feeder:
             for topic in topics
         }
         for topic, publisher in self._publishers.items():
-            wait_until(lambda publisher=publisher: publisher.get_num_connections() > 0, 'a subscriber to ' + topic)
+            wait_until(lambda topic=topic, publisher=publisher: publisher.get_num_connections() >= subscribers(topic) > 0,
+                       'every subscriber to ' + topic)
 
     def feed(self, messages, speed=20.0):
         begin, first = time.time(), messages[0][2]
