@@ -57,8 +57,8 @@ TEST(ReferencePolicy, ExactlyAtTheLimitItIsKept) {
 TEST(ReferencePolicy, TheStepBeginsAnewAtANewReference) {
   ReferencePolicy policy(limits());
   EXPECT_TRUE(policy.replaces(SE2(0.9, 0, 0), kGoodOverlap, true));
-  // From the new reference: a step of 0.4 m, not one back by 0.5 m.
-  EXPECT_FALSE(policy.replaces(SE2(0.4, 0, 0), kGoodOverlap, true));
+  // From the new reference: a step of 0.4 m, not one back by 1.3 m.
+  EXPECT_FALSE(policy.replaces(SE2(-0.4, 0, 0), kGoodOverlap, true));
 }
 
 TEST(ReferencePolicy, ReplacesWhereScansHardlyOverlap) {
