@@ -115,7 +115,7 @@ class BadInput(unittest.TestCase):
         cls.pid = manager_pid()
         cls.recorder = helpers.Recorder()
         rospy.set_param('/refused', {'gate_probability': 2.0, 'kf_dist_linear': 'far', 'publish_tf': 1, 'odom_frame': ''})
-        rospy.set_param('/sckf_odometry', {'kf_dist_linaer': 0.3, 'kf_dist_linear': 1})
+        rospy.set_param('/sckf_odometry', {'kf_dist_linaer': 0.3, 'kf_dist_linear': 1, 'max_scan_delay': 10000})
         cls.loaders = [load_nodelet('refused')]
         helpers.wait_until(lambda: cls.recorder.log('not started'), 'the refusal of bad parameters')
         cls.loaders.append(load_nodelet('sckf_odometry'))
