@@ -37,6 +37,7 @@ struct LossDerivatives {
   Eigen::Matrix3Xd by_reference;                      // ∂²L/∂x∂z_k, 3 × M_k
   Eigen::Matrix3Xd by_current;                        // ∂²L/∂x∂z_{k+m}, 3 × M_{k+m}
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();  // Σ over blocks of beams of g gᵀ, g the gradient of a block
+  int blocks = 0;
   double loss_weight = 0.0;
   double loss_square = 0.0;
 };
@@ -100,6 +101,7 @@ LossDerivatives differentiate(const AlignmentProblem& problem, const SE2& x, con
       out.scatter += block_gradient * block_gradient.transpose();
       block_gradient.setZero();
       block = its_block;
+      ++out.blocks;
     }
     block_gradient += w * t.e * t.A;
   }
@@ -108,14 +110,15 @@ LossDerivatives differentiate(const AlignmentProblem& problem, const SE2& x, con
 }
 
 /// R_n: by how much the residuals scatter beyond what range noise explains, as a covariance of the displacement. Range
-/// noise gives R_z; the gradients of blocks of neighbouring beams give what is seen. Only the excess is matching noise.
-MatrixDD matchingNoise(const MatrixDD& range_covariance, const MatrixDD& seen_covariance) {
+/// noise gives R_z; the gradients of blocks of neighbouring beams give what is seen, as a variance is seen in so many
+/// samples: to √(2/blocks). Only what exceeds both is matching noise.
+MatrixDD matchingNoise(const MatrixDD& range_covariance, const MatrixDD& seen_covariance, int blocks) {
   const Eigen::LLT<MatrixDD> range(range_covariance);
   const MatrixDD L = range.matrixL();
   MatrixDD whitened = range.matrixL().solve(seen_covariance);
   whitened = range.matrixL().solve(whitened.transpose()).eval();
   const Eigen::SelfAdjointEigenSolver<MatrixDD> eigen(0.5 * (whitened + whitened.transpose()));
-  const Eigen::VectorXd excess = (eigen.eigenvalues().array() - 1.0).max(0.0);
+  const Eigen::VectorXd excess = (eigen.eigenvalues().array() - 1.0 - std::sqrt(2.0 / blocks)).max(0.0);
   const MatrixDD half = L * eigen.eigenvectors();
   return half * excess.asDiagonal() * half.transpose();
 }
@@ -140,7 +143,7 @@ std::optional<DisplacementEstimate> estimateDisplacement(const AlignmentProblem&
   z.variance_reference = problem.reference().rangeVariances();
   z.variance_current = problem.current().rangeVariances();
   z.matching_noise = MatrixDD::Zero(seen.dimension(), seen.dimension());
-  z.matching_noise = matchingNoise(z.covariance(), implicit * loss.scatter * implicit.transpose());
+  z.matching_noise = matchingNoise(z.covariance(), implicit * loss.scatter * implicit.transpose(), loss.blocks);
   estimate.residual_rms = std::sqrt(loss.loss_square / loss.loss_weight);
   return estimate;
 }

@@ -85,6 +85,24 @@ bool hasDirection(const Surface& surface, double range_noise, const SurfaceOptio
   return surface.valid() && range_noise < options.max_normal_std * std::sqrt(surface.spread);
 }
 
+/// A point that has no surface of its own because noise bent every stretch around it, but lies on one that was fitted
+/// to its neighbours with it. Left alone, such points on a wall would claim to know where along the wall they are.
+const Surface* surfaceOfNeighbours(const ScannedPoints& points, const std::vector<Surface>& surfaces, int i,
+                                   double range_noise) {
+  constexpr int kReach = 8;
+  constexpr double kOnSurface = 2.5;  // std of a range
+  const Eigen::Vector2d& p = points.point[static_cast<std::size_t>(i)];
+  for (int distance = 1; distance <= kReach; ++distance) {
+    for (const int j : {i - distance, i + distance}) {
+      if (j < 0 || j >= static_cast<int>(surfaces.size())) continue;
+      const Surface& surface = surfaces[static_cast<std::size_t>(j)];
+      const bool covers = surface.valid() && surface.first <= i && i <= surface.last;
+      if (covers && std::abs(surface.normal.dot(p - surface.centroid)) < kOnSurface * range_noise) return &surface;
+    }
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 std::vector<Surface> fitSurfaces(const ScannedPoints& points, double range_noise, double angle_increment,
@@ -102,6 +120,12 @@ std::vector<Surface> fitSurfaces(const ScannedPoints& points, double range_noise
       if (surface.normal.dot(points.ray[k]) > 0.0) surface.normal = -surface.normal;
       surfaces[k] = surface;
     }
+  }
+  const std::vector<Surface> own = surfaces;
+  for (int i = 0; i < n; ++i) {
+    Surface& surface = surfaces[static_cast<std::size_t>(i)];
+    const Surface* shared = surface.valid() ? nullptr : surfaceOfNeighbours(points, own, i, range_noise);
+    if (shared != nullptr) surface = *shared;
   }
   return surfaces;
 }

@@ -31,6 +31,11 @@ OdometrySample OdometryBuffer::at(Stamp stamp) const {
   return sample;
 }
 
+Stamp OdometryBuffer::lastUpTo(Stamp stamp) const {
+  const auto later = [](Stamp instant, const OdometrySample& sample) { return instant < sample.stamp; };
+  return std::prev(std::upper_bound(samples_.begin(), samples_.end(), stamp, later))->stamp;
+}
+
 std::vector<OdometryBuffer::Step> OdometryBuffer::steps(Stamp from, Stamp to) const {
   std::vector<Step> steps;
   if (from >= to) return steps;

@@ -73,9 +73,13 @@ OdometryBuffer::Insertion ScanOdometry::addOdometry(const OdometrySample& sample
     twist_.add(increment({*before, sample}), seconds(sample.stamp - before->stamp));
   }
   if (!filter_) start(sample);
-  // Without scans the filter follows the wheels at a distance, so that the buffer stays small.
+  // Without scans the filter follows the wheels at a distance, so that the buffer stays small; from sample to sample,
+  // so that it makes no difference when the samples arrived.
   const Stamp too_old = odometry_.newest() - fromSeconds(options_.max_scan_delay);
-  if (too_old > filter_stamp_) propagateTo(too_old);
+  if (too_old > filter_stamp_) {
+    const Stamp last = odometry_.lastUpTo(too_old);
+    if (last > filter_stamp_) propagateTo(last);
+  }
   carryOn();
   return insertion;
 }
@@ -149,7 +153,7 @@ bool ScanOdometry::fuse(ScanReport& report) {
   if (report.innovation->nis() > bound && looksLikeSlip(report.match)) {
     const Eigen::Vector3d std(options_.gate.slip_std_translation, options_.gate.slip_std_translation,
                               options_.gate.slip_std_yaw);
-    filter_->propagate({SE2(), std.cwiseAbs2().asDiagonal()});  // the wheels were wrong by more than their model says
+    filter_->distrustWheels(std.cwiseAbs2().asDiagonal());
     report.innovation = filter_->innovation(displacement);
     report.outcome = ScanOutcome::kSlip;
   }

@@ -69,7 +69,7 @@ List estimationParameters(PipelineOptions& pipeline) {
       number("slip_std_yaw", gate.slip_std_yaw, atLeast(0.0), "rad"),
       number("slip_min_overlap", gate.slip_min_overlap, within(0.0, 1.0)),
       number("slip_max_residual", gate.slip_max_residual, above(0.0)),
-      number("max_scan_delay", pipeline.max_scan_delay, atLeast(0.0), "s"),
+      number("max_scan_delay", pipeline.max_scan_delay, above(0.0), "s"),
       number("max_waiting_scans", pipeline.max_waiting_scans, within(1, 100000), "scans"),
   };
 }

@@ -162,7 +162,12 @@ class Replay {
   }
 
   void run() {
-    const rosbag::Bag bag(arguments_.bag, rosbag::bagmode::Read);
+    rosbag::Bag bag;
+    try {
+      bag.open(arguments_.bag, rosbag::bagmode::Read);
+    } catch (const rosbag::BagException& exception) {
+      throw std::runtime_error(arguments_.bag + ": " + exception.what());
+    }
     rosbag::View view(bag, rosbag::TopicQuery({"/tf", "/tf_static", arguments_.scan_topic, arguments_.odom_topic}));
     const auto begin = std::chrono::steady_clock::now();
     ProgressBar progress(view.size());
@@ -204,7 +209,8 @@ class Replay {
   void addOdometry(const nav_msgs::Odometry& message) {
     if (options_.node.use_tf_odometry) return;
     std::string problem;
-    const auto sample = toOdometrySample(message, &problem);
+    auto sample = toOdometrySample(message, &problem);
+    if (sample) sample = tf_.inBaseFrame(*sample, frameName(message.child_frame_id), &problem);
     if (sample) {
       pipeline_.addOdometry(*sample);
     } else {
@@ -252,7 +258,8 @@ std::optional<Arguments> parse(int argc, char** argv) {
   // clang-format off
   shown.add_options()("help,h", "show this help")
     ("trajectory", po::value(&arguments.trajectory), "write the poses at the scans, in the format of TUM")
-    ("csv", po::value(&arguments.csv), "write what became of each scan")
+    ("csv", po::value(&arguments.csv),
+     "write what became of each scan; the innovation is along the directions that the scans see, in m")
     ("params", po::value(&arguments.params), "parameter file, as config/sckf_odometry.yaml")
     ("method", po::value(&arguments.method), "instead of the parameter file's method")
     ("scan-topic", po::value(&arguments.scan_topic)->default_value(arguments.scan_topic), "")

@@ -54,7 +54,7 @@ class Install(unittest.TestCase):
         self.assertIn(self.prefix + '/share/sckf_odometry/nodelet_plugins.xml', plugins)
 
     def test_the_tools_run_from_there(self):
-        for tool in ('replay', 'rawlog_to_bag', 'evaluate', 'plot'):
+        for tool in ('replay', 'rawlog_to_bag', 'evaluate', 'plot', 'experiment', 'experiment_data'):
             self.assertIn('usage', self.in_the_installed_space('%s/lib/sckf_odometry/%s --help' % (self.prefix, tool)))
 
     def test_nothing_points_back_to_the_build(self):

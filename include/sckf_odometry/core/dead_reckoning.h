@@ -14,6 +14,7 @@ class DeadReckoning : public FusionMethod {
   Eigen::Matrix3d covariance() const override { return covariance_; }
 
   void propagate(const OdometryIncrement& increment) override;
+  void distrustWheels(const Eigen::Matrix3d&) override {}
   DisplacementPrediction predictedDisplacement() const override { return since_clone_; }
   Innovation innovation(const Displacement& displacement) const override;
   void update(const Displacement&, const Innovation&) override {}

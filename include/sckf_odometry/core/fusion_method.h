@@ -34,6 +34,10 @@ class FusionMethod {
   virtual Eigen::Matrix3d covariance() const = 0;  ///< of the error of pose()
 
   virtual void propagate(const OdometryIncrement& increment) = 0;
+
+  /// The wheels slipped: what they said since the last update may be wrong by this covariance (in base_link) more.
+  virtual void distrustWheels(const Eigen::Matrix3d& covariance) { propagate({SE2(), covariance}); }
+
   virtual DisplacementPrediction predictedDisplacement() const = 0;
 
   /// Residual, its covariance and the gain that update() would use: for gating. The displacement must see at least

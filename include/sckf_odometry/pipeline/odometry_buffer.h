@@ -36,6 +36,9 @@ class OdometryBuffer {
   const OdometrySample& newestSample() const { return samples_.back(); }
   bool covers(Stamp stamp) const { return !empty() && oldest() <= stamp && stamp <= newest(); }
 
+  /// The stamp of the newest sample that is not newer than an instant, which must not be older than the oldest.
+  Stamp lastUpTo(Stamp stamp) const;
+
   struct Step {
     OdometrySample from;
     OdometrySample to;
