@@ -119,7 +119,7 @@ class DriftTest(unittest.TestCase):
         self.check_drift(log, bag, bag.with_suffix(".tum"), percent, deg_per_m)
 
     def test_intel(self) -> None:
-        self.check_recorded("intel", 1.15, 0.105)
+        self.check_recorded("intel", 1.1, 0.09)
 
     def test_intel_raw(self) -> None:
         self.check_recorded("intel-raw", 1.5, 0.1)

@@ -22,7 +22,7 @@ struct MatcherOptions {
   double search_yaw_step = 0.12;        ///< [rad] between the start yaws
   int search_yaw_steps = 4;             ///< start yaws to either side of the prediction
   int min_pairs = 20;                   ///< fewer points with a partner are "too few pairs"
-  double min_overlap = 0.2;             ///< a smaller share of the points with a partner is "no overlap"
+  double min_overlap = 0.1;             ///< a smaller share of the points with a partner is "no overlap"
   double max_refinement = 0.5;  ///< [m, rad] a larger correction of the aligned pose by the estimate is "diverged"
   PairOptions pairs;
   EstimationOptions estimation;
