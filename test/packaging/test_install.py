@@ -53,6 +53,14 @@ class Install(unittest.TestCase):
         plugins = self.in_the_installed_space('rospack plugins --attrib=plugin nodelet')
         self.assertIn(self.prefix + '/share/sckf_odometry/nodelet_plugins.xml', plugins)
 
+    def test_its_messages_are_there_in_both_languages(self):
+        for name in ('Status', 'SetPose'):
+            self.assertTrue(os.path.exists('%s/include/sckf_odometry/%s.h' % (self.prefix, name)), name)
+        modules = self.in_the_installed_space(
+            'python3 -c "from sckf_odometry import msg, srv; print(msg.Status()); print(srv.SetPose, msg.__file__)"')
+        self.assertIn('reference_age: 0.0', modules)
+        self.assertIn(self.prefix, modules)
+
     def test_the_tools_run_from_there(self):
         for tool in ('replay', 'rawlog_to_bag', 'evaluate', 'plot', 'experiment', 'experiment_data'):
             self.assertIn('usage', self.in_the_installed_space('%s/lib/sckf_odometry/%s --help' % (self.prefix, tool)))
