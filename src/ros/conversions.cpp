@@ -1,5 +1,7 @@
 #include "sckf_odometry/ros/conversions.h"
 
+#include <sensor_msgs/point_cloud2_iterator.h>
+
 #include <array>
 #include <cmath>
 #include <sstream>
@@ -165,6 +167,24 @@ geometry_msgs::PoseStamped toPoseStamped(const SE2& pose, Stamp stamp, const std
   message.header.frame_id = frame;
   message.pose = toPose(pose);
   return message;
+}
+
+sensor_msgs::PointCloud2 toPointCloud(const std::vector<Eigen::Vector2d>& points, Stamp stamp,
+                                      const std::string& frame) {
+  sensor_msgs::PointCloud2 cloud;
+  cloud.header.stamp = toTime(stamp);
+  cloud.header.frame_id = frame;
+  sensor_msgs::PointCloud2Modifier modifier(cloud);
+  modifier.setPointCloud2FieldsByString(1, "xyz");
+  modifier.resize(points.size());
+  sensor_msgs::PointCloud2Iterator<float> out(cloud, "x");
+  for (const Eigen::Vector2d& point : points) {
+    out[0] = static_cast<float>(point.x());
+    out[1] = static_cast<float>(point.y());
+    out[2] = 0.0F;
+    ++out;
+  }
+  return cloud;
 }
 
 geometry_msgs::TransformStamped toTransform(const SE2& frame_from_child, Stamp stamp, const std::string& frame,

@@ -1,7 +1,5 @@
 #include "sckf_odometry/ros/recorders.h"
 
-#include <sensor_msgs/point_cloud2_iterator.h>
-
 #include <cmath>
 
 #include "sckf_odometry/ros/conversions.h"
@@ -48,20 +46,7 @@ void CloudRecorder::add(const SE2& odom_from_base, const std::vector<Eigen::Vect
 }
 
 sensor_msgs::PointCloud2 CloudRecorder::message(Stamp stamp, const std::string& frame) const {
-  sensor_msgs::PointCloud2 cloud;
-  cloud.header.frame_id = frame;
-  cloud.header.stamp = toTime(stamp);
-  sensor_msgs::PointCloud2Modifier modifier(cloud);
-  modifier.setPointCloud2FieldsByString(1, "xyz");
-  modifier.resize(points_.size());
-  sensor_msgs::PointCloud2Iterator<float> out(cloud, "x");
-  for (const Eigen::Vector2d& point : points_) {
-    out[0] = static_cast<float>(point.x());
-    out[1] = static_cast<float>(point.y());
-    out[2] = 0.0F;
-    ++out;
-  }
-  return cloud;
+  return toPointCloud({points_.begin(), points_.end()}, stamp, frame);
 }
 
 }  // namespace sckf

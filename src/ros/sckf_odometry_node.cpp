@@ -50,6 +50,7 @@ ScKfOdometryNode::ScKfOdometryNode(ros::NodeHandle nh, const ros::NodeHandle& pr
       tf_(options_.node.base_frame, options_.node.use_tf_odometry ? options_.node.tf_odometry_frame : "",
           toDuration(options_.node.time_jump)),
       publisher_(nh, options_.node),
+      debug_view_(nh, options_.node),
       diagnostics_(nh, private_nh, private_nh.getNamespace()),
       scan_topic_(nh.resolveName("scan")),
       odometry_topic_(nh.resolveName("odom")) {
@@ -237,6 +238,7 @@ void ScKfOdometryNode::account(const ScanReport& report) {
   ++counts_.scans[report.outcome];
   last_scan_ = toString(report.outcome) + (report.reason.empty() ? "" : ": " + report.reason);
   if (!report.reason.empty()) warnings_.warn("scan", "scan on " + scan_topic_ + " not used: " + last_scan_);
+  debug_view_.show(report);
   if (!report.estimate) return;
   publisher_.publish(*report.estimate);
   publisher_.publishScan(*report.estimate, report.scan.get());

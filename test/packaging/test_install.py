@@ -44,7 +44,8 @@ class Install(unittest.TestCase):
                      'lib/sckf_odometry/evaluate', 'lib/sckf_odometry/plot', share + 'package.xml',
                      share + 'nodelet_plugins.xml', share + 'launch/sckf_odometry.launch',
                      share + 'launch/replay.launch', share + 'config/sckf_odometry.yaml',
-                     share + 'config/sckf_odometry.rviz', 'include/sckf_odometry/core/se2.h'):
+                     share + 'config/live.rviz', share + 'config/debug.rviz',
+                     share + 'config/compare.rviz', 'include/sckf_odometry/core/se2.h'):
             self.assertTrue(os.path.exists(os.path.join(self.prefix, name)), name)
 
     def test_the_package_and_its_nodelet_are_found_there(self):

@@ -6,10 +6,12 @@
 #include <geometry_msgs/TransformStamped.h>
 #include <nav_msgs/Odometry.h>
 #include <sensor_msgs/LaserScan.h>
+#include <sensor_msgs/PointCloud2.h>
 
 #include <Eigen/Geometry>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "sckf_odometry/pipeline/scan_odometry.h"
 
@@ -50,6 +52,10 @@ nav_msgs::Odometry toOdometryMessage(const Estimate& estimate, const std::string
                                      const std::string& base_frame);
 geometry_msgs::PoseWithCovarianceStamped toPoseMessage(const Estimate& estimate, const std::string& odom_frame);
 geometry_msgs::PoseStamped toPoseStamped(const SE2& pose, Stamp stamp, const std::string& frame);
+
+/// Points in the plane of the frame.
+sensor_msgs::PointCloud2 toPointCloud(const std::vector<Eigen::Vector2d>& points, Stamp stamp,
+                                      const std::string& frame);
 
 /// The transform that takes coordinates in child_frame to coordinates in frame.
 geometry_msgs::TransformStamped toTransform(const SE2& frame_from_child, Stamp stamp, const std::string& frame,

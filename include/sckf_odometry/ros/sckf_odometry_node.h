@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "sckf_odometry/pipeline/scan_odometry.h"
+#include "sckf_odometry/ros/debug_view.h"
 #include "sckf_odometry/ros/estimate_publisher.h"
 #include "sckf_odometry/ros/parameters.h"
 #include "sckf_odometry/ros/tf_input.h"
@@ -79,6 +80,7 @@ class ScKfOdometryNode {
   std::unique_ptr<ScanOdometry> pipeline_;
   TfInput tf_;
   EstimatePublisher publisher_;
+  DebugView debug_view_;
   Warnings warnings_;
   Counts counts_;
   std::deque<sensor_msgs::LaserScan::ConstPtr> scans_without_mount_;

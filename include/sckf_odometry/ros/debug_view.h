@@ -1,0 +1,33 @@
+// How each scan is compared with its reference, for rviz.
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+
+#include "sckf_odometry/ros/debug_markers.h"
+#include "sckf_odometry/ros/parameters.h"
+
+namespace sckf {
+
+/// Publishes debug/reference_scan and debug/aligned_scan (sensor_msgs/PointCloud2) and debug/markers
+/// (visualization_msgs/MarkerArray, see debugMarkers()), all in odom_frame and at the scan's stamp. A topic to which
+/// nobody subscribes costs nothing.
+class DebugView {
+ public:
+  DebugView(ros::NodeHandle nh, const NodeOptions& options);
+
+  /// To be told of every scan, in order. One that was compared with nothing clears the view; one that was not used at
+  /// all leaves it as it is.
+  void show(const ScanReport& report);
+
+ private:
+  void publish(const ScanReport& report) const;
+
+  std::string odom_frame_;
+  ros::Publisher reference_scan_;
+  ros::Publisher aligned_scan_;
+  ros::Publisher markers_;
+  PlacedScan reference_;  // its scan is null before the first
+};
+
+}  // namespace sckf

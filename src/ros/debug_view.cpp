@@ -1,0 +1,54 @@
+#include "sckf_odometry/ros/debug_view.h"
+
+#include <sensor_msgs/PointCloud2.h>
+
+#include "sckf_odometry/ros/conversions.h"
+
+namespace sckf {
+
+namespace {
+
+constexpr uint32_t kQueue = 10;
+
+/// The scan drawn in odom; empty if there is none.
+sensor_msgs::PointCloud2 toCloud(const PlacedScan& placed, Stamp stamp, const std::string& frame) {
+  std::vector<Eigen::Vector2d> points;
+  if (placed.scan) {
+    for (const Eigen::Vector2d& point : placed.scan->points.point) points.push_back(placed.odom_from_base * point);
+  }
+  return toPointCloud(points, stamp, frame);
+}
+
+template <typename Build>
+void publishIfWatched(const ros::Publisher& publisher, const Build& build) {
+  if (publisher.getNumSubscribers() > 0) publisher.publish(build());
+}
+
+}  // namespace
+
+DebugView::DebugView(ros::NodeHandle nh, const NodeOptions& options)
+    : odom_frame_(options.odom_frame),
+      reference_scan_(nh.advertise<sensor_msgs::PointCloud2>("debug/reference_scan", kQueue)),
+      aligned_scan_(nh.advertise<sensor_msgs::PointCloud2>("debug/aligned_scan", kQueue)),
+      markers_(nh.advertise<visualization_msgs::MarkerArray>("debug/markers", kQueue)) {}
+
+void DebugView::show(const ScanReport& report) {
+  if (!report.estimate) return;
+  publish(report);
+  if (report.new_reference) reference_ = {report.scan, report.estimate->odom_from_base};
+}
+
+void DebugView::publish(const ScanReport& report) const {
+  const bool compared = report.scan && reference_.scan && report.reference_stamp == reference_.scan->stamp;
+  const PlacedScan aligned{report.scan, report.estimate->odom_from_base};
+  // At the scan's stamp, all of them: the reference may be so old that TF has forgotten its time.
+  publishIfWatched(reference_scan_,
+                   [&] { return toCloud(compared ? reference_ : PlacedScan(), report.stamp, odom_frame_); });
+  publishIfWatched(aligned_scan_,
+                   [&] { return toCloud(compared ? aligned : PlacedScan(), report.stamp, odom_frame_); });
+  publishIfWatched(markers_, [&] {
+    return compared ? debugMarkers(report, reference_, odom_frame_) : noDebugMarkers(report.stamp, odom_frame_);
+  });
+}
+
+}  // namespace sckf
