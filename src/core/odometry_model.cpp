@@ -1,7 +1,8 @@
 #include "sckf_odometry/core/odometry_model.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
+
+#include "sckf_odometry/core/covariance.h"
 
 namespace sckf {
 
@@ -21,14 +22,9 @@ OdometryIncrement statedIncrement(const SE2& before_from_after, const Eigen::Mat
 }
 
 bool sensibleTwistCovariance(const Eigen::Matrix3d& twist_covariance) {
-  constexpr double kUnknown = 1e3;     // drivers write 1e3, 1e6, 1e9 for what they do not measure
-  constexpr double kTolerance = 1e-9;  // relative, for symmetry and eigenvalues
-  if (!twist_covariance.allFinite()) return false;
+  constexpr double kUnknown = 1e3;  // drivers write 1e3, 1e6, 1e9 for what they do not measure
   const double scale = twist_covariance.cwiseAbs().maxCoeff();
-  if (scale <= 0.0 || scale >= kUnknown) return false;
-  if (!twist_covariance.isApprox(twist_covariance.transpose(), kTolerance)) return false;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(twist_covariance, Eigen::EigenvaluesOnly);
-  return eigen.eigenvalues().minCoeff() >= -kTolerance * scale;
+  return isCovariance(twist_covariance) && scale > 0.0 && scale < kUnknown;
 }
 
 }  // namespace sckf

@@ -4,12 +4,43 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
+
+#include "sckf_odometry/core/covariance.h"
 
 namespace sckf {
 
 namespace {
 
-Stamp fromSeconds(double s) { return std::chrono::duration_cast<Stamp>(std::chrono::duration<double>(s)); }
+/// So many scans beyond the time-out mean that the wheels are silent; one may have a wrong stamp.
+constexpr std::size_t kConfirmations = 3;
+
+/// Up to ±30 years, which added to a time is still a stamp.
+Stamp fromSeconds(double s) {
+  return std::chrono::duration_cast<Stamp>(std::chrono::duration<double>(std::clamp(s, -1e9, 1e9)));
+}
+
+using Clock = std::chrono::steady_clock;
+double secondsSince(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+void checkMethod(const std::string& method) {
+  if (makeFusionMethod(method, SE2(), Eigen::Matrix3d::Zero())) return;
+  std::string known;
+  for (const std::string& name : fusionMethodNames()) known += (known.empty() ? "" : ", ") + name;
+  throw std::invalid_argument("method is \"" + method + "\": expected one of " + known);
+}
+
+void checkPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance) {
+  std::ostringstream problem;
+  if (!odom_from_base.vector().allFinite()) {
+    problem << "pose is (" << odom_from_base.vector().transpose() << "): expected finite values";
+  } else if (!isCovariance(covariance)) {
+    const Eigen::IOFormat in_a_row(Eigen::StreamPrecision, Eigen::DontAlignCols, ", ", "; ");
+    problem << "covariance of the pose is [" << covariance.format(in_a_row)
+            << "]: expected a finite, symmetric, positive semi-definite matrix";
+  }
+  if (!problem.str().empty()) throw std::invalid_argument(problem.str());
+}
 
 /// The value that a χ² variable of so many degrees of freedom exceeds with probability 1 − p.
 double chiSquared(Eigen::Index degrees_of_freedom, double p) {
@@ -55,24 +86,28 @@ std::string toString(ScanOutcome outcome) {
   return "unknown";
 }
 
-ScanOdometry::ScanOdometry(const PipelineOptions& options)
-    : options_(options), matcher_(options.matcher), reference_policy_(options.reference), twist_(options.twist_window) {
-  if (!makeFusionMethod(options.method, SE2(), Eigen::Matrix3d::Zero())) {
-    std::string known;
-    for (const std::string& name : fusionMethodNames()) known += (known.empty() ? "" : ", ") + name;
-    throw std::invalid_argument("method is \"" + options.method + "\": expected one of " + known);
-  }
+ScanOdometry::ScanOdometry(const PipelineOptions& options, const SE2& odom_from_base, const Eigen::Matrix3d& covariance)
+    : options_(options),
+      matcher_(options.matcher),
+      reference_policy_(options.reference),
+      odometry_(options.motion, options.odometry_timeout),
+      twist_(options.twist_window),
+      start_(odom_from_base),
+      start_covariance_(covariance) {
+  checkMethod(options.method);
+  checkPose(odom_from_base, covariance);
 }
 
 OdometryBuffer::Insertion ScanOdometry::addOdometry(const OdometrySample& sample) {
-  std::optional<OdometrySample> before;
-  if (!odometry_.empty()) before = odometry_.newestSample();
-  const OdometryBuffer::Insertion insertion = odometry_.insert(sample);
-  if (insertion != OdometryBuffer::Insertion::kInserted) return insertion;
-  if (before && sample.stamp > before->stamp) {
-    twist_.add(increment({*before, sample}), seconds(sample.stamp - before->stamp));
+  using Insertion = OdometryBuffer::Insertion;
+  const Stamp newest_before = odometry_.empty() ? sample.stamp : odometry_.newest();
+  const Insertion insertion = odometry_.insert(sample, guess());
+  if (insertion != Insertion::kNotFinite && insertion != Insertion::kAhead) {
+    wheels_heard_ = std::max(wheels_heard_.value_or(sample.stamp), sample.stamp);
   }
-  if (!filter_) start(sample);
+  if (insertion != Insertion::kInserted) return insertion;
+  followWheels(newest_before);
+  if (!filter_) begin(start_, start_covariance_, sample.stamp);
   // Without scans the filter follows the wheels at a distance, so that the buffer stays small; from sample to sample,
   // so that it makes no difference when the samples arrived.
   const Stamp too_old = odometry_.newest() - fromSeconds(options_.max_scan_delay);
@@ -85,27 +120,32 @@ OdometryBuffer::Insertion ScanOdometry::addOdometry(const OdometrySample& sample
 }
 
 void ScanOdometry::addScan(LaserScan scan, const Eigen::Isometry3d& base_from_laser) {
-  const auto later = [](Stamp stamp, const WaitingScan& other) { return stamp < other.scan.stamp; };
-  const auto place = std::upper_bound(waiting_.begin(), waiting_.end(), scan.stamp, later);
-  waiting_.insert(place, {std::move(scan), base_from_laser});
+  if (!isTime(scan.stamp)) {
+    std::ostringstream reason;
+    reason << "its stamp is " << seconds(scan.stamp) << " s: expected a time between 1970 and 2106";
+    given_up_.push_back(notUsed(scan.stamp, ScanOutcome::kUnusable, reason.str()));
+    return;
+  }
+  waiting_.add(std::move(scan), base_from_laser);
   if (waiting_.size() > static_cast<std::size_t>(options_.max_waiting_scans)) {
-    given_up_.push_back(notUsed(waiting_.front().scan.stamp, ScanOutcome::kNoOdometry,
-                                "too many scans wait for odometry at their stamps"));
-    waiting_.pop_front();
+    given_up_.push_back(
+        notUsed(waiting_.giveUp(), ScanOutcome::kNoOdometry, "too many scans wait for odometry at their stamps"));
   }
 }
 
 std::vector<ScanReport> ScanOdometry::process() {
   std::vector<ScanReport> reports;
   reports.swap(given_up_);
-  while (!waiting_.empty() && filter_ && waiting_.front().scan.stamp <= odometry_.newest()) {
-    reports.push_back(take(waiting_.front()));
-    waiting_.pop_front();
+  while (!waiting_.empty()) {
+    const bool bracketed = filter_ && waiting_.oldest() <= odometry_.newest();
+    if (!bracketed && !bridgeTo(waiting_.oldest())) break;
+    reports.push_back(take(waiting_.takeOldest()));
   }
   return reports;
 }
 
-ScanReport ScanOdometry::take(const WaitingScan& waiting) {
+ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
+  const Clock::time_point begin = Clock::now();
   const Stamp stamp = waiting.scan.stamp;
   if (!odometry_.covers(stamp)) return notUsed(stamp, ScanOutcome::kNoOdometry, "older than the odometry at hand");
   if (stamp < filter_stamp_ || (reference_ && stamp == filter_stamp_)) {
@@ -113,7 +153,10 @@ ScanReport ScanOdometry::take(const WaitingScan& waiting) {
   }
   ScanReport report;
   report.stamp = stamp;
+  const Stamp before = filter_stamp_;
+  const DisplacementPrediction at_before = filter_->predictedDisplacement();
   propagateTo(stamp);  // (9)-(14)
+  report.wheels_known = std::exchange(wheels_known_, true);
   report.scan = prepareScan(waiting.scan, waiting.base_from_laser, options_.scan, &report.reason);
   if (!report.scan) {
     report.outcome = ScanOutcome::kUnusable;
@@ -122,6 +165,7 @@ ScanReport ScanOdometry::take(const WaitingScan& waiting) {
   } else {
     compareWithReference(report);  // (16)-(23)
   }
+  if (odometry_.endsBridged()) followScans(before, at_before, report);
   if (report.new_reference) {
     filter_->clone(report.scan->rangeVariances());  // (24)-(27)
     reference_ = report.scan;
@@ -129,14 +173,17 @@ ScanReport ScanOdometry::take(const WaitingScan& waiting) {
   report.estimate = estimate();
   carried_on_.reset();
   carryOn();
+  report.total_time = secondsSince(begin);
   return report;
 }
 
 void ScanOdometry::compareWithReference(ScanReport& report) {
   report.reference_stamp = reference_->stamp;
-  report.prediction = filter_->predictedDisplacement();                         // (16)
+  report.prediction = filter_->predictedDisplacement();  // (16)
+  const Clock::time_point begin = Clock::now();
   report.match = matcher_.match(*reference_, *report.scan, report.prediction);  // (1)
-  const bool used = report.match.displacement ? fuse(report) : false;           // (17)-(23)
+  report.match_time = secondsSince(begin);
+  const bool used = report.match.displacement ? fuse(report) : false;  // (17)-(23)
   if (!report.match.displacement) {
     report.outcome = ScanOutcome::kNoMatch;
     report.reason = toString(report.match.failure);
@@ -155,7 +202,7 @@ bool ScanOdometry::fuse(ScanReport& report) {
                               options_.gate.slip_std_yaw);
     filter_->distrustWheels(std.cwiseAbs2().asDiagonal());
     report.innovation = filter_->innovation(displacement);
-    report.outcome = ScanOutcome::kSlip;
+    if (report.wheels_known) report.outcome = ScanOutcome::kSlip;
   }
   if (report.innovation->nis() > bound) {
     report.outcome = ScanOutcome::kGated;
@@ -176,13 +223,43 @@ std::optional<Estimate> ScanOdometry::latest() const {
   return Estimate{carried_on_stamp_, carried_on_->pose(), carried_on_->covariance(), twist_.twist()};
 }
 
-void ScanOdometry::start(const OdometrySample& first) {
-  filter_ = makeFusionMethod(options_.method, SE2(), Eigen::Matrix3d::Zero());  // (6)(7)
-  filter_stamp_ = first.stamp;
+void ScanOdometry::setPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp) {
+  checkPose(odom_from_base, covariance);
+  start_ = odom_from_base;
+  start_covariance_ = covariance;
+  if (!filter_) return;
+  propagateTo(stamp >= filter_stamp_ && odometry_.covers(stamp) ? stamp : odometry_.newest());
+  begin(odom_from_base, covariance, filter_stamp_);
+}
+
+void ScanOdometry::setOptions(const PipelineOptions& options) {
+  if (options.method != options_.method) {
+    throw std::invalid_argument("method is \"" + options.method + "\": expected \"" + options_.method +
+                                "\", which only a new estimate can change");
+  }
+  options_ = options;
+  matcher_ = ScanMatcher(options.matcher);
+  reference_policy_.setOptions(options.reference);
+  odometry_.setLimits(options.motion, options.odometry_timeout);
+  twist_.setDuration(options.twist_window);
+}
+
+void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp) {
+  filter_ = makeFusionMethod(options_.method, odom_from_base, 0.5 * (covariance + covariance.transpose()));  // (6)(7)
+  filter_stamp_ = stamp;
+  odometry_.discardBefore(stamp);
+  wheels_known_ = true;
+  reference_.reset();
+  reference_policy_ = ReferencePolicy(options_.reference);
+  carried_on_.reset();
+  carryOn();
 }
 
 void ScanOdometry::propagateTo(Stamp stamp) {
-  for (const OdometryBuffer::Step& step : odometry_.steps(filter_stamp_, stamp)) filter_->propagate(increment(step));
+  for (const OdometryBuffer::Step& step : odometry_.steps(filter_stamp_, stamp)) {
+    filter_->propagate(increment(step));
+    if (step.guess) wheels_known_ = false;
+  }
   filter_stamp_ = stamp;
   odometry_.discardBefore(stamp);
 }
@@ -198,7 +275,56 @@ void ScanOdometry::carryOn() {
   carried_on_stamp_ = odometry_.newest();
 }
 
+bool ScanOdometry::onScansAlone() const {
+  const Stamp timeout = fromSeconds(options_.odometry_timeout);
+  const bool alone = odometry_.endsBridged() && (!wheels_heard_ || odometry_.newest() > *wheels_heard_ + timeout);
+  return alone || (!waiting_.empty() && wheelsAreSilent());
+}
+
+bool ScanOdometry::wheelsAreSilent() const {
+  const Stamp timeout = fromSeconds(options_.odometry_timeout);
+  const bool alone = odometry_.endsBridged();
+  const Stamp heard = wheels_heard_.value_or(alone ? odometry_.oldest() - timeout : waiting_.oldest());
+  if (alone && waiting_.oldest() > heard + timeout && waiting_.oldest() <= odometry_.newest() + timeout) return true;
+  const auto most = static_cast<std::size_t>(options_.max_waiting_scans);
+  return waiting_.countAfter(heard + timeout) >= std::min(kConfirmations, most);
+}
+
+bool ScanOdometry::bridgeTo(Stamp stamp) {
+  const bool scans_tell = options_.method != "dead_reckoning";
+  if (!options_.scans_alone || !scans_tell || !wheelsAreSilent()) return false;
+  odometry_.bridge(stamp, guess());
+  if (!filter_) begin(start_, start_covariance_, stamp);
+  return true;
+}
+
+void ScanOdometry::followWheels(Stamp since) {
+  for (const OdometryBuffer::Step& step : odometry_.steps(since, odometry_.newest())) {
+    if (step.guess) continue;
+    twist_.add(increment(step), seconds(step.to.stamp - step.from.stamp));
+    motion_known_ = step.to.stamp;
+  }
+}
+
+/// Without wheels the twist is that of the estimate from scan to scan. The covariance leaves aside that both ends have
+/// the reference's noise in common: it is too large rather than too small.
+void ScanOdometry::followScans(Stamp since, const DisplacementPrediction& at_since, const ScanReport& report) {
+  const DisplacementPrediction now = filter_->predictedDisplacement();
+  Eigen::Matrix3d A;
+  Eigen::Matrix3d B;
+  const SE2 motion = between(at_since.reference_from_current, now.reference_from_current, &A, &B);
+  twist_.add({motion, A * at_since.covariance * A.transpose() + B * now.covariance * B.transpose()},
+             seconds(report.stamp - since));
+  const bool used = report.outcome == ScanOutcome::kUpdated || report.outcome == ScanOutcome::kSlip;
+  if (used && report.match.displacement->dimension() == 3) motion_known_ = report.stamp;
+}
+
+MotionGuess ScanOdometry::guess() const { return {twist_.twist().mean, motion_known_}; }
+
 OdometryIncrement ScanOdometry::increment(const OdometryBuffer::Step& step) const {
+  if (step.guess) {
+    return guessedIncrement(*step.guess, step.from.stamp, step.to.stamp, options_.odometry_timeout, options_.motion);
+  }
   const SE2 motion = between(step.from.odom_from_base, step.to.odom_from_base);
   const auto& stated = step.to.twist_covariance;
   if (options_.prefer_twist_covariance && stated && sensibleTwistCovariance(*stated)) {

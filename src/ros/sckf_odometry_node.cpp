@@ -151,6 +151,8 @@ void ScKfOdometryNode::addOdometry(const OdometrySample& sample) {
     case OdometryBuffer::Insertion::kNotFinite:
       refuseOdometry("its pose is not finite");
       break;
+    case OdometryBuffer::Insertion::kAhead:
+      break;  // the next one tells whether its stamp is right
   }
   advance();
   publisher_.addWheels(sample);

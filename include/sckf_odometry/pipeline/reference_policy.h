@@ -19,6 +19,9 @@ class ReferencePolicy {
  public:
   explicit ReferencePolicy(const ReferenceOptions& options) : options_(options) {}
 
+  /// From the next scan on.
+  void setOptions(const ReferenceOptions& options) { options_ = options; }
+
   /// Whether a scan becomes the reference. reference_from_scan: its pose as estimated now. overlap: of its match. used:
   /// whether its displacement corrected the estimate.
   bool replaces(const SE2& reference_from_scan, double overlap, bool used);

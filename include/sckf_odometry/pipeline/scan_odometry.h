@@ -3,7 +3,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +14,7 @@
 #include "sckf_odometry/pipeline/odometry_buffer.h"
 #include "sckf_odometry/pipeline/reference_policy.h"
 #include "sckf_odometry/pipeline/twist_window.h"
+#include "sckf_odometry/pipeline/waiting_scans.h"
 
 namespace sckf {
 
@@ -36,9 +36,12 @@ struct PipelineOptions {
   MatcherOptions matcher;
   ReferenceOptions reference;
   GateOptions gate;
-  double twist_window = 0.2;    ///< [s] the twist is the mean over this time: stamps of odometry come in bursts
-  double max_scan_delay = 5.0;  ///< [s] a scan that is older than the newest odometry by more is not used
-  int max_waiting_scans = 50;   ///< scans that wait for odometry; beyond, the oldest is given up
+  MotionLimits motion;
+  double twist_window = 0.2;      ///< [s] the twist is the mean over this time: stamps of odometry come in bursts
+  double max_scan_delay = 5.0;    ///< [s] a scan that is older than the newest odometry by more is not used
+  int max_waiting_scans = 50;     ///< scans that wait for odometry; beyond, the one that has waited longest is given up
+  double odometry_timeout = 1.0;  ///< [s] wheels whose newest odometry is older than scans by more are silent
+  bool scans_alone = false;       ///< silent wheels: the scans carry on alone; false: the estimate waits
 };
 
 /// Where base_link is in odom, with the covariance of the additive error in x, y, yaw.
@@ -72,18 +75,26 @@ struct ScanReport {
   std::optional<Innovation> innovation;      ///< where there is a displacement
   Stamp reference_stamp{0};                  ///< of the scan that it was compared with
   bool new_reference = false;                ///< it became the reference
+  bool wheels_known = true;                  ///< false: wheels did not tell all of the motion since the scan before
+  double match_time = 0.0;                   ///< [s] spent on the comparison with the reference …
+  double total_time = 0.0;                   ///< [s] … and on the scan on the whole
   std::shared_ptr<const PreparedScan> scan;  ///< its points in base_link; null if it was not used
 };
 
 class ScanOdometry {
  public:
-  /// Throws std::invalid_argument if there is no method of that name.
-  explicit ScanOdometry(const PipelineOptions& options);
+  /// The estimate starts at a pose, with a covariance: symmetric, positive semi-definite. Throws std::invalid_argument
+  /// with name, value and what is expected if there is no method of that name, or pose or covariance are none.
+  explicit ScanOdometry(const PipelineOptions& options, const SE2& odom_from_base = SE2(),
+                        const Eigen::Matrix3d& covariance = Eigen::Matrix3d::Zero());
 
-  /// Samples may come in any order as long as they are newer than the last scan taken.
+  /// Samples may come in any order as long as they are newer than the last scan taken. A step of the wheels that they
+  /// cannot have made (see OdometryBuffer) is no motion: the estimate goes on at its velocity, less certain by
+  /// options.motion.
   OdometryBuffer::Insertion addOdometry(const OdometrySample& sample);
 
-  /// The scan waits until odometry brackets its stamp. base_from_laser: the mount at the time of the scan.
+  /// The scan waits until odometry brackets its stamp, or until the wheels are silent and scans may carry on alone.
+  /// base_from_laser: the mount at the time of the scan.
   void addScan(LaserScan scan, const Eigen::Isometry3d& base_from_laser);
 
   /// Takes the scans whose time has come, oldest first, and says what became of each.
@@ -92,21 +103,37 @@ class ScanOdometry {
   /// The estimate carried on by the wheels to the newest odometry; empty before the first odometry.
   std::optional<Estimate> latest() const;
 
+  /// The robot was there, whatever has been estimated; at the newest odometry, if none is at hand for the stamp.
+  /// Nothing is kept of what relates the estimate to its past: the next scan becomes the reference. Before the first
+  /// odometry: where the estimate starts. Throws as the constructor does.
+  void setPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp);
+
+  /// From the next scan on; the estimate and its reference stay. Throws std::invalid_argument if the method differs.
+  void setOptions(const PipelineOptions& options);
+
+  /// The wheels are silent: the scans carry on alone, or wait, as options.scans_alone says.
+  bool onScansAlone() const;
+
+  /// Steps of the wheels that were not taken for motion.
+  std::size_t odometryJumps() const { return odometry_.jumps(); }
+
   const PipelineOptions& options() const { return options_; }
 
  private:
-  struct WaitingScan {
-    LaserScan scan;
-    Eigen::Isometry3d base_from_laser;
-  };
-
-  ScanReport take(const WaitingScan& waiting);
-  void start(const OdometrySample& first);
-  void propagateTo(Stamp stamp);
+  void begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp);
+  ScanReport take(const WaitingScans::Entry& waiting);
   void compareWithReference(ScanReport& report);
   bool fuse(ScanReport& report);
   bool looksLikeSlip(const Match& match) const;
+  void propagateTo(Stamp stamp);
   void carryOn();
+
+  bool wheelsAreSilent() const;
+  bool bridgeTo(Stamp stamp);
+  void followWheels(Stamp since);
+  void followScans(Stamp since, const DisplacementPrediction& at_since, const ScanReport& report);
+  MotionGuess guess() const;
+
   OdometryIncrement increment(const OdometryBuffer::Step& step) const;
   Estimate estimate() const;
 
@@ -115,11 +142,16 @@ class ScanOdometry {
   ReferencePolicy reference_policy_;
   OdometryBuffer odometry_;
   TwistWindow twist_;
-  std::deque<WaitingScan> waiting_;
+  WaitingScans waiting_;
   std::vector<ScanReport> given_up_;
+  std::optional<Stamp> wheels_heard_;  // the newest stamp of odometry, used or not
+  Stamp motion_known_{0};              // until here the motion has been measured
 
+  SE2 start_;  // odom_from_base before there is a filter
+  Eigen::Matrix3d start_covariance_;
   std::unique_ptr<FusionMethod> filter_;  // at filter_stamp_; null before the first odometry
   Stamp filter_stamp_{0};
+  bool wheels_known_ = true;  // since the last scan
   std::shared_ptr<const PreparedScan> reference_;
   std::optional<DeadReckoning> carried_on_;  // the estimate, from filter_stamp_ on by the wheels to carried_on_stamp_
   Stamp carried_on_stamp_{0};

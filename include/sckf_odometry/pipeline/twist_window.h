@@ -25,6 +25,9 @@ class TwistWindow {
   /// duration: [s], > 0.
   explicit TwistWindow(double duration) : duration_(duration) {}
 
+  /// From the next increment on.
+  void setDuration(double duration) { duration_ = duration; }
+
   /// The motion up to the stamp, made in dt [s].
   void add(const OdometryIncrement& increment, double dt);
   Twist twist() const;

@@ -1,0 +1,38 @@
+// Scans that wait for odometry at their stamps.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <deque>
+
+#include "sckf_odometry/matching/laser_scan.h"
+
+namespace sckf {
+
+/// Sorted by stamp; of equal stamps the first to come is the first.
+class WaitingScans {
+ public:
+  struct Entry {
+    LaserScan scan;
+    Eigen::Isometry3d base_from_laser;
+    std::size_t arrival = 0;
+  };
+
+  void add(LaserScan scan, const Eigen::Isometry3d& base_from_laser);
+
+  bool empty() const { return scans_.empty(); }
+  std::size_t size() const { return scans_.size(); }
+  Stamp oldest() const { return scans_.front().scan.stamp; }
+  Stamp newest() const { return scans_.back().scan.stamp; }
+  std::size_t countAfter(Stamp stamp) const;
+
+  Entry takeOldest();
+
+  /// Drops the scan that has waited longest, which is not the oldest if its stamp is wrong. Returns its stamp.
+  Stamp giveUp();
+
+ private:
+  std::deque<Entry> scans_;
+  std::size_t arrivals_ = 0;
+};
+
+}  // namespace sckf
