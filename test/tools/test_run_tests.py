@@ -2,6 +2,8 @@
 """scripts/run_tests on a build folder made by hand: what counts as passed and as failed."""
 from __future__ import annotations
 
+import json
+import os
 import subprocess
 import tempfile
 import unittest
@@ -18,13 +20,19 @@ class RunTestsTest(unittest.TestCase):
     def setUp(self) -> None:
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
-        self.build = Path(folder.name)
-        self.results = self.build / "test_results" / "pkg"
-        self.results.mkdir(parents=True)
-        (self.build / "run_tests.py").write_text("# stands for catkin's\n", encoding="utf-8")
+        self.builds = [Path(folder.name) / name for name in ("build", "another_build")]
+        for build in self.builds:
+            (build / "test_results" / "pkg").mkdir(parents=True)
+            (build / "run_tests.py").write_text("# stands for catkin's\n", encoding="utf-8")
+        self.use(self.builds[0])
+
+    def use(self, build: Path) -> None:
+        """The build folder that tests are registered in from here on."""
+        self.build = build
+        self.results = build / "test_results" / "pkg"
 
     def register(self, name: str, cases: str | None, exit_code: int = 0, kind: str = "gtest",
-                 beside: dict[str, str] | None = None) -> None:
+                 beside: dict[str, str] | None = None, labels: str = "") -> None:
         """A test called as catkin calls it, whose program writes a result (unless None) and ends with the exit code."""
         commands = []
         files = dict(beside or {})
@@ -37,14 +45,17 @@ class RunTestsTest(unittest.TestCase):
         script = self.build / f"{name}.sh"
         script.write_text("\n".join([*commands, f"exit {exit_code}"]), encoding="utf-8")
         result = self.results / f"{kind}-{name}.xml"
-        self.add_test(f"_ctest_pkg_{kind}_{name}", f'"/bin/sh" "{script}" "run_tests.py" "{result}"')
+        self.add_test(f"_ctest_pkg_{kind}_{name}", f'"/bin/sh" "{script}" "run_tests.py" "{result}"', labels)
 
-    def add_test(self, name: str, command: str) -> None:
+    def add_test(self, name: str, command: str, labels: str = "") -> None:
         with open(self.build / "CTestTestfile.cmake", "a", encoding="utf-8") as file:
             file.write(f"add_test({name} {command})\n")
+            if labels:
+                file.write(f'set_tests_properties({name} PROPERTIES LABELS "{labels}")\n')
 
-    def check(self, last_line: str, exit_code: int, *mentioned: str, selection: tuple[str, ...] = ()) -> None:
-        done = subprocess.run([str(RUN_TESTS), str(self.build), *(["--", *selection] if selection else [])],
+    def check(self, last_line: str, exit_code: int, *mentioned: str, selection: tuple[str, ...] = (),
+              builds: int = 1) -> None:
+        done = subprocess.run([str(RUN_TESTS), *map(str, self.builds[:builds]), *(["--", *selection] if selection else [])],
                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True, check=False)
         self.assertEqual(done.stdout.splitlines()[-1], last_line, done.stdout)
         self.assertEqual(done.returncode, exit_code, done.stdout)
@@ -116,10 +127,45 @@ class RunTestsTest(unittest.TestCase):
         self.register("nodes", died, kind="rostest", exit_code=1)
         self.check("0 passed, 1 failed", 1, "FAILED: rostest.testfilter")
 
+    def test_the_cases_of_each_kind_are_counted(self) -> None:
+        self.register("one", PASSED * 3 + SKIPPED, labels="unit")
+        self.register("two", PASSED + FAILED, exit_code=1, labels="unit")
+        self.register("three", PASSED * 4, kind="pytest", labels="programs and scripts")
+        self.add_test("four", '"/bin/true"', labels="unit")
+        self.check("9 passed, 1 failed", 1, "     6 unit\n", "     4 programs and scripts\n")
+
+    def test_that_it_runs_on_request_only_is_no_kind(self) -> None:
+        self.register("one", PASSED, labels="soak;long")
+        self.check("1 passed, 0 failed", 0, "     1 soak\n")
+
+    def test_a_test_registered_without_a_kind_is_seen(self) -> None:
+        self.register("one", PASSED * 2)
+        self.check("2 passed, 0 failed", 0, "     2 of no kind\n")
+
+    def test_several_builds_have_one_count(self) -> None:
+        self.register("one", PASSED * 2, labels="unit")
+        self.use(self.builds[1])
+        self.register("one", PASSED + FAILED, exit_code=1, labels="sanitizers")
+        self.check("3 passed, 1 failed", 1, "     2 unit\n", "     2 sanitizers\n", builds=2)
+
+    def test_a_build_folder_that_is_none_is_a_failure(self) -> None:
+        self.register("one", PASSED)
+        self.builds[1] = self.builds[1] / "nowhere"
+        self.check("1 passed, 1 failed", 1, builds=2)
+
     def test_a_selection_is_ctests(self) -> None:
         self.register("one", PASSED)
         self.register("two", PASSED * 2)
         self.check("2 passed, 0 failed", 0, selection=("-R", "two"))
+
+    @unittest.skipUnless(os.environ.get("SCKF_BUILD_DIR"), "no build folder in SCKF_BUILD_DIR")
+    def test_every_test_of_the_package_has_a_kind(self) -> None:
+        listing = subprocess.run(["ctest", "--show-only=json-v1"], cwd=os.environ["SCKF_BUILD_DIR"], check=True,
+                                 stdout=subprocess.PIPE)
+        tests = json.loads(listing.stdout)["tests"]
+        labelled = {test["name"] for test in tests for each in test["properties"] if each["name"] == "LABELS"}
+        self.assertGreater(len(labelled), 10)
+        self.assertEqual({test["name"] for test in tests} - labelled, set())
 
 
 if __name__ == "__main__":
