@@ -141,7 +141,7 @@ def true_trajectory(stamps):
     return np.array([between(truth(0.0), truth(stamp - START)) for stamp in stamps])
 
 
-def messages(duration=45.0, mount=None, seed=1):
+def messages(duration=45.0, mount=None, seed=1, beams=360):
     """(topic, message, stamp) in the order of time."""
     mount = mount or Mount(x=0.2)
     rng = np.random.default_rng(seed)
@@ -152,7 +152,7 @@ def messages(duration=45.0, mount=None, seed=1):
         out.append(('/odom', odometry_message(rospy.Time.from_sec(stamp), pose), stamp))
     t = 0.1
     while t < duration - 0.1:
-        scan = scan_message(rospy.Time.from_sec(START + t), truth(t), mount, segments, rng)
+        scan = scan_message(rospy.Time.from_sec(START + t), truth(t), mount, segments, rng, beams)
         out.append(('/scan', scan, START + t))
         t += SCAN_PERIOD
     return sorted(out, key=lambda entry: entry[2])
