@@ -15,9 +15,10 @@ namespace {
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
 
-constexpr double kAbovePoints = 0.05;  // [m] so that the points of the scans do not hide what is drawn about them
-constexpr double kLineWidth = 0.025;   // [m]
-constexpr double kTextHeight = 0.25;   // [m]
+constexpr double kAbovePoints = 0.05;   // [m] so that the points of the scans do not hide what is drawn about them
+constexpr double kPairWidth = 0.025;    // [m]
+constexpr double kEllipseWidth = 0.04;  // [m]
+constexpr double kTextHeight = 0.25;    // [m]
 
 struct Colour {
   float r, g, b;
@@ -25,7 +26,7 @@ struct Colour {
 constexpr Colour kPairColour{0.24F, 0.90F, 0.24F};
 constexpr Colour kCovarianceColour{0.78F, 0.47F, 1.0F};
 constexpr Colour kUnobservableColour{1.0F, 0.27F, 0.24F};
-constexpr Colour kLabelColour{0.90F, 0.90F, 0.92F};
+constexpr Colour kLabelColour{1.0F, 0.90F, 0.63F};
 
 /// All markers there are. A displacement sees one direction at least, so two at most are not seen.
 enum Index : std::size_t { kPairs, kCovariance, kUnobservable, kSecondUnobservable, kLabel, kMarkers };
@@ -56,7 +57,7 @@ void draw(Marker& marker, int type, const Colour& colour) {
 
 void drawPairs(Marker& marker, const PlacedScan& reference, const PlacedScan& aligned, const std::vector<Pair>& pairs) {
   draw(marker, Marker::LINE_LIST, kPairColour);
-  marker.scale.x = kLineWidth;
+  marker.scale.x = kPairWidth;
   for (const Pair& pair : pairs) {
     const Eigen::Vector2d& from = reference.scan->points.point[static_cast<std::size_t>(pair.reference)];
     const Eigen::Vector2d& to = aligned.scan->points.point[static_cast<std::size_t>(pair.current)];
@@ -79,7 +80,7 @@ void drawEllipse(Marker& marker, const SE2& odom_from_reference, const SE2& refe
                  const Eigen::Matrix2d& half_axes) {
   constexpr int kCorners = 48;
   draw(marker, Marker::LINE_STRIP, kCovarianceColour);
-  marker.scale.x = kLineWidth;
+  marker.scale.x = kEllipseWidth;
   for (int i = 0; i <= kCorners; ++i) {
     const double angle = 2.0 * M_PI * i / kCorners;
     const Eigen::Vector2d off = kEllipseMagnification * half_axes * Eigen::Vector2d(std::cos(angle), std::sin(angle));
