@@ -34,14 +34,30 @@ double estimateRangeNoise(const ScannedPoints& points, double angle_increment, c
   return std::clamp(robustStd(std::move(deviations)), options.range_noise_min, options.range_noise_max);
 }
 
+bool anglesAreSensible(const LaserScan& scan) {
+  constexpr double kTurn = 2.0 * M_PI;
+  const double fan = std::abs(scan.angle_increment) * static_cast<double>(scan.ranges.size());
+  return std::abs(scan.angle_min) <= 2.0 * kTurn && scan.angle_increment != 0.0 && fan <= 1.1 * kTurn;
+}
+
+bool mountIsSensible(const Eigen::Isometry3d& base_from_laser) {
+  constexpr double kFarthest = 100.0;  // [m]
+  return base_from_laser.matrix().allFinite() && base_from_laser.translation().norm() <= kFarthest;
+}
+
 /// What makes the geometry of a scan unusable, or nothing.
 std::string geometryProblem(const LaserScan& scan, const Eigen::Isometry3d& base_from_laser) {
   std::ostringstream problem;
-  if (!std::isfinite(scan.angle_min) || !std::isfinite(scan.angle_increment) || scan.angle_increment == 0.0) {
-    problem << "angle_min is " << scan.angle_min << ", angle_increment " << scan.angle_increment
-            << ": expected finite values [rad] and an increment that is not zero";
-  } else if (!base_from_laser.matrix().allFinite()) {
-    problem << "the laser's mount is not finite";
+  if (!anglesAreSensible(scan)) {
+    problem << "angle_min is " << scan.angle_min << ", angle_increment " << scan.angle_increment << " with "
+            << scan.ranges.size() << " ranges: expected values in rad, an increment that is not zero and beams within "
+            << "one turn";
+  } else if (!(scan.range_min < scan.range_max)) {
+    problem << "range_min is " << scan.range_min << ", range_max " << scan.range_max
+            << ": expected range_min below range_max [m]";
+  } else if (!mountIsSensible(base_from_laser)) {
+    problem << "the laser's mount is at (" << base_from_laser.translation().transpose()
+            << "): expected a finite pose within 100 m of the base";
   } else if (std::abs(base_from_laser.linear()(2, 2)) < std::cos(kMaxTilt)) {
     problem << "the laser's plane is tilted against the x-y plane of the base by "
             << std::acos(std::abs(base_from_laser.linear()(2, 2))) * 180.0 / M_PI << " deg: expected at most "
@@ -50,13 +66,23 @@ std::string geometryProblem(const LaserScan& scan, const Eigen::Isometry3d& base
   return problem.str();
 }
 
+/// Every k-th beam, so that no more are left than allowed: time and memory are proportional to them.
+LaserScan thinned(const LaserScan& scan, std::size_t max_beams) {
+  const std::size_t k = (scan.ranges.size() + max_beams - 1) / max_beams;
+  LaserScan thin = scan;
+  thin.angle_increment *= static_cast<double>(k);
+  thin.ranges.clear();
+  for (std::size_t i = 0; i < scan.ranges.size(); i += k) thin.ranges.push_back(scan.ranges[i]);
+  return thin;
+}
+
 ScannedPoints readings(const LaserScan& scan, const Eigen::Isometry3d& base_from_laser, double range_min,
                        double range_max) {
   const Eigen::Vector2d origin = base_from_laser.translation().head<2>();
   ScannedPoints points;
   for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
     const auto range = static_cast<double>(scan.ranges[i]);
-    const bool read = std::isfinite(range) && range > 0.0 && range >= range_min && range <= range_max;
+    const bool read = std::isfinite(range) && range > 0.0 && range >= range_min && range < range_max;
     if (!read) continue;
     const double bearing = scan.angle_min + static_cast<double>(i) * scan.angle_increment;
     const Eigen::Vector3d ray = base_from_laser.linear() * Eigen::Vector3d(std::cos(bearing), std::sin(bearing), 0.0);
@@ -82,6 +108,10 @@ std::shared_ptr<const PreparedScan> prepareScan(const LaserScan& scan, const Eig
   };
   const std::string problem = geometryProblem(scan, base_from_laser);
   if (!problem.empty()) return reject(problem);
+  const auto max_beams = static_cast<std::size_t>(std::max(1, options.max_beams));
+  if (scan.ranges.size() > max_beams) {
+    return prepareScan(thinned(scan, max_beams), base_from_laser, options, rejection);
+  }
 
   auto prepared = std::make_shared<PreparedScan>();
   prepared->stamp = scan.stamp;
@@ -92,7 +122,7 @@ std::shared_ptr<const PreparedScan> prepareScan(const LaserScan& scan, const Eig
   if (prepared->size() < static_cast<std::size_t>(options.min_points)) {
     std::ostringstream reason;
     reason << prepared->size() << " of " << scan.ranges.size() << " ranges are finite and within [" << range_min << ", "
-           << range_max << "] m: expected at least " << options.min_points;
+           << range_max << ") m: expected at least " << options.min_points;
     return reject(reason.str());
   }
   prepared->range_noise = estimateRangeNoise(prepared->points, scan.angle_increment, options);

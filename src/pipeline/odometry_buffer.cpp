@@ -86,6 +86,7 @@ void OdometryBuffer::bridge(Stamp stamp, const MotionGuess& guess) {
   entry.guess->since = std::min(guess.since, empty() ? stamp : newest());
   entry.bridged = true;
   samples_.push_back(entry);
+  if (ahead_ && ahead_->stamp <= stamp) ahead_.reset();
 }
 
 OdometryBuffer::Entry OdometryBuffer::at(Stamp stamp) const {

@@ -31,13 +31,15 @@ void checkMethod(const std::string& method) {
 }
 
 void checkPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance) {
+  constexpr double kLargest = 1e9;  // beyond, doubles tell centimetres no more
+  const Eigen::Vector3d pose = odom_from_base.vector();
+  const Eigen::IOFormat in_a_row(Eigen::StreamPrecision, Eigen::DontAlignCols, ", ", "; ");
   std::ostringstream problem;
-  if (!odom_from_base.vector().allFinite()) {
-    problem << "pose is (" << odom_from_base.vector().transpose() << "): expected finite values";
-  } else if (!isCovariance(covariance)) {
-    const Eigen::IOFormat in_a_row(Eigen::StreamPrecision, Eigen::DontAlignCols, ", ", "; ");
+  if (!pose.allFinite() || pose.cwiseAbs().maxCoeff() > kLargest) {
+    problem << "pose is (" << pose.transpose().format(in_a_row) << "): expected finite values up to " << kLargest;
+  } else if (!isCovariance(covariance) || covariance.cwiseAbs().maxCoeff() > kLargest) {
     problem << "covariance of the pose is [" << covariance.format(in_a_row)
-            << "]: expected a finite, symmetric, positive semi-definite matrix";
+            << "]: expected a symmetric, positive semi-definite matrix of finite values up to " << kLargest;
   }
   if (!problem.str().empty()) throw std::invalid_argument(problem.str());
 }
@@ -127,7 +129,7 @@ void ScanOdometry::addScan(LaserScan scan, const Eigen::Isometry3d& base_from_la
     return;
   }
   waiting_.add(std::move(scan), base_from_laser);
-  if (waiting_.size() > static_cast<std::size_t>(options_.max_waiting_scans)) {
+  while (waiting_.size() > static_cast<std::size_t>(options_.max_waiting_scans)) {
     given_up_.push_back(
         notUsed(waiting_.giveUp(), ScanOutcome::kNoOdometry, "too many scans wait for odometry at their stamps"));
   }

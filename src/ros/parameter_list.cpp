@@ -81,6 +81,7 @@ List scanParameters(ScanOptions& scan) {
       number("range_noise_min", scan.range_noise_min, above(0.0), "m"),
       number("range_noise_max", scan.range_noise_max, above(0.0), "m"),
       number("min_points", scan.min_points, within(3, 1000000), "points"),
+      number("max_beams", scan.max_beams, within(20, 1000000), "beams"),
       number("surface_straightness", scan.surface.straightness, above(0.0)),
       number("surface_length", scan.surface.length, above(0.0), "m"),
       number("surface_max_normal_std", scan.surface.max_normal_std, above(0.0), "rad"),

@@ -62,6 +62,7 @@ struct Experiment {
   Correlations correlations = Correlations::kKept;
   double start_std = 1e-3;      // of x, y [m] and yaw [rad]
   double start_yaw_std = 1e-3;  // [rad]
+  int pose_set_at = 0;          // scan after which the pose is told anew; 0: never
 };
 
 /// Sums over the runs, one entry per scan.
@@ -87,7 +88,10 @@ void run(const Experiment& experiment, RandomInputs& random, Statistics& sums) {
   const Eigen::Vector3d start_std(experiment.start_std, experiment.start_std, experiment.start_yaw_std);
   const Eigen::Matrix3d P_0 = start_std.cwiseAbs2().asDiagonal();
   SE2 odom_from_base = experiment.world.start;  // the truth
-  StochasticCloningFilter filter(corrected(odom_from_base, random.drawnFrom(P_0)), P_0, experiment.correlations);
+  const auto told = [&](const Eigen::Matrix3d& P) {
+    return StochasticCloningFilter(corrected(odom_from_base, random.drawnFrom(P)), P, experiment.correlations);
+  };
+  StochasticCloningFilter filter = told(P_0);
   SimulatedScan reference = room.scan(odom_from_base, random);
   filter.clone(reference.variance);
 
@@ -104,7 +108,8 @@ void run(const Experiment& experiment, RandomInputs& random, Statistics& sums) {
     const Innovation innovation = filter.innovation(z);
     filter.update(z, innovation);
     add(error(odom_from_base, filter.pose()), filter.covariance(), innovation.nis(), scan, sums);
-    if (scan % experiment.scans_per_reference == 0) {
+    if (scan == experiment.pose_set_at) filter = told(Eigen::Vector3d(0.2, 0.1, 0.05).cwiseAbs2().asDiagonal());
+    if (scan == experiment.pose_set_at || scan % experiment.scans_per_reference == 0) {
       reference = current;
       filter.clone(current.variance);
     }
@@ -158,6 +163,19 @@ INSTANTIATE_TEST_SUITE_P(Worlds, Consistency,
                            return std::string(std::get<0>(info.param).name) + "References" +
                                   std::to_string(std::get<1>(info.param));
                          });
+
+/// A pose that is set drops the clone and all that is correlated with it. The scan after becomes the reference.
+TEST(PoseSetInMidRun, LeavesErrorsAndInnovationsConsistent) {
+  for (const int scans_per_reference : {1, 5}) {
+    SCOPED_TRACE(scans_per_reference);
+    Experiment experiment;
+    experiment.scans_per_reference = scans_per_reference;
+    experiment.pose_set_at = 23;
+    const Statistics sums = simulate(experiment);
+    expectInBand(sums.nees, 3, "NEES");
+    expectInBand(sums.nis, 3, "NIS");
+  }
+}
 
 TEST(HardlyKnownYaw, StaysHardlyKnown) {
   // Displacements say nothing about the absolute yaw, however much the estimate moves while a reference is kept.

@@ -73,7 +73,7 @@ TEST(PreparedScan, SaysWhatIsWrongWithABadScan) {
 
   LaserScan blind = wallAhead();
   for (float& range : blind.ranges) range = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_THAT(rejectionOf(blind), HasSubstr("0 of 91 ranges are finite and within [0.1, 10] m: expected at least 20"));
+  EXPECT_THAT(rejectionOf(blind), HasSubstr("0 of 91 ranges are finite and within [0.1, 10) m: expected at least 20"));
 
   LaserScan still = wallAhead();
   still.angle_increment = 0.0;
@@ -86,6 +86,51 @@ TEST(PreparedScan, SaysWhatIsWrongWithABadScan) {
   Eigen::Isometry3d tilted = kAtBase;
   tilted.rotate(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitY()));
   EXPECT_THAT(rejectionOf(wallAhead(), tilted), HasSubstr("tilted"));
+}
+
+TEST(PreparedScan, NamesTheValueThatIsWrong) {
+  LaserScan degrees = wallAhead();
+  degrees.angle_increment = 1.0;
+  EXPECT_THAT(rejectionOf(degrees), HasSubstr("angle_increment 1 with 91 ranges: expected values in rad"));
+  degrees = wallAhead();
+  degrees.angle_min = -45.0;
+  EXPECT_THAT(rejectionOf(degrees), HasSubstr("angle_min is -45"));
+
+  LaserScan turned = wallAhead();
+  std::swap(turned.range_min, turned.range_max);
+  EXPECT_THAT(rejectionOf(turned), HasSubstr("range_min is 10, range_max 0.1: expected range_min below range_max"));
+  turned.range_max = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(rejectionOf(turned), HasSubstr("range_max nan"));
+
+  Eigen::Isometry3d far = kAtBase;
+  far.translation().y() = 1e6;
+  EXPECT_THAT(rejectionOf(wallAhead(), far), HasSubstr("mount is at (    0 1e+06     0)"));
+}
+
+/// What a laser that sees nothing says at every beam is no round room.
+TEST(PreparedScan, TheLargestRangeItselfIsNoReading) {
+  LaserScan blind = wallAhead();
+  for (float& range : blind.ranges) range = 10.0F;
+  EXPECT_THAT(rejectionOf(blind), HasSubstr("0 of 91 ranges"));
+}
+
+TEST(PreparedScan, OfTooManyBeamsSomeAreLeftOutEvenly) {
+  SimulatedLaser laser;
+  laser.beams = 100000;
+  laser.angle_increment = 2.0 * M_PI / laser.beams;
+  ScanOptions options;
+  options.max_beams = 1500;
+  const auto dense = prepareScan(simulateScan(room(), SE2(), laser), kAtBase, options);
+  ASSERT_NE(dense, nullptr);
+  EXPECT_EQ(dense->beams, 1493U);  // every 67th
+  EXPECT_EQ(dense->rangeVariances().size(), 1493);
+  ASSERT_EQ(dense->size(), 1493U);
+  for (std::size_t i = 0; i < dense->size(); i += 100) {
+    const double bearing = laser.angle_min + 67.0 * static_cast<double>(i) * laser.angle_increment;
+    EXPECT_NEAR(wrapAngle(std::atan2(dense->points.point[i].y(), dense->points.point[i].x()) - bearing), 0.0, 1e-6);
+  }
+  options.max_beams = 100000;
+  EXPECT_EQ(prepareScan(simulateScan(room(), SE2(), laser), kAtBase, options)->beams, 100000U);
 }
 
 TEST(PreparedScan, TheMountTakesPointsToTheBase) {

@@ -188,6 +188,138 @@ TEST(OdometryBuffer, HoldsNoMoreThanItsWindow) {
   EXPECT_LE(buffer.steps(buffer.oldest(), buffer.newest()).size(), 101U);
 }
 
+// ---- steps that are no motion ---------------------------------------------------------------------------------------
+
+/// Which steps are guesses: "k" known, "?" guess.
+std::string knowledge(const std::vector<OdometryBuffer::Step>& steps) {
+  std::string text;
+  for (const auto& step : steps) text += step.guess ? '?' : 'k';
+  return text;
+}
+
+const MotionGuess kGuess{Eigen::Vector3d(1, 0, 0), ms(20)};
+
+TEST(OdometryBuffer, AStepBeyondTheLimitsIsNoMotion) {
+  OdometryBuffer buffer = straight({0, 20});
+  buffer.insert(sample(ms(40), SE2(7, 0, 0)), kGuess);  // the driver's frame has jumped …
+  buffer.insert(sample(ms(60), SE2(7.02, 0, 0)), kGuess);
+  buffer.insert(sample(ms(80), SE2(7.02, 0, 2.0)), kGuess);  // … and again, in yaw
+  const auto steps = buffer.steps(ms(0), ms(80));
+  EXPECT_EQ(knowledge(steps), "k?k?");
+  EXPECT_EQ(buffer.jumps(), 2U);
+  EXPECT_EQ(steps[1].guess->since, ms(20));
+  EXPECT_EQ(steps[1].guess->velocity.x(), 1.0);
+}
+
+/// Half of a jump could be motion by itself.
+TEST(OdometryBuffer, AJumpStaysOneWhereItIsInterpolated) {
+  OdometryBuffer buffer = straight({0, 20});
+  buffer.insert(sample(ms(40), SE2(0.9, 0, 0)), kGuess);
+  EXPECT_EQ(knowledge(buffer.steps(ms(0), ms(30))), "k?");
+  EXPECT_EQ(knowledge(buffer.steps(ms(30), ms(40))), "?");
+  buffer.discardBefore(ms(30));
+  EXPECT_EQ(knowledge(buffer.steps(ms(30), ms(40))), "?") << "its beginning taken, the rest is still of the jump";
+}
+
+TEST(OdometryBuffer, ALateSampleDecidesAnewWhatIsMotion) {
+  OdometryBuffer buffer = straight({0});
+  EXPECT_EQ(buffer.insert(sample(ms(400), SE2(3.0, 0, 0)), kGuess), Insertion::kInserted);
+  EXPECT_EQ(knowledge(buffer.steps(ms(0), ms(400))), "?");  // 3 m in 0.4 s
+  EXPECT_EQ(buffer.jumps(), 1U);
+  buffer.insert(sample(ms(300), SE2(1.5, 0, 0)), kGuess);
+  EXPECT_EQ(knowledge(buffer.steps(ms(0), ms(400))), "k?");
+  buffer.insert(sample(ms(350), SE2(2.3, 0, 0)), kGuess);  // bursts: 0.7 m in 50 ms, and once more
+  EXPECT_EQ(knowledge(buffer.steps(ms(0), ms(400))), "k?k");
+  EXPECT_EQ(buffer.jumps(), 1U);
+  buffer.insert(sample(ms(325), SE2(1.9, 0, 0)), kGuess);
+  EXPECT_EQ(knowledge(buffer.steps(ms(0), ms(400))), "kkkk");
+  EXPECT_EQ(buffer.jumps(), 0U);
+}
+
+/// After silence at a place away from the origin the driver says the origin: it has begun anew.
+TEST(OdometryBuffer, ASilenceThatEndsAtTheOriginIsAReset) {
+  for (const int silence : {900, 5000}) {
+    for (const SE2& after : {SE2(), SE2(0.05, 0, 0.05), SE2(1.2, 0, 0)}) {
+      OdometryBuffer buffer;
+      buffer.insert(sample(ms(0), SE2(2.0, 0, 0)), kGuess);
+      buffer.insert(sample(ms(silence), after), kGuess);
+      buffer.insert(sample(ms(silence + 20), after), kGuess);
+      const bool reset = silence > 1000 && after.x < 1.0;
+      EXPECT_EQ(knowledge(buffer.steps(ms(0), ms(silence + 20))), reset ? "?k" : "kk") << silence << " ms, " << after.x;
+    }
+  }
+}
+
+TEST(OdometryBuffer, NearTheOriginASilenceIsAPauseLikeAnyOther) {
+  OdometryBuffer buffer;
+  buffer.insert(sample(ms(0), SE2(0.3, 0, 0)));
+  buffer.insert(sample(ms(5000), SE2()));
+  buffer.insert(sample(ms(5020), SE2()));
+  EXPECT_EQ(knowledge(buffer.steps(ms(0), ms(5020))), "kk");
+}
+
+TEST(OdometryBuffer, NoMotionLeadsOutOfABridge) {
+  OdometryBuffer buffer = straight({0, 20});
+  EXPECT_FALSE(buffer.endsBridged());
+  buffer.bridge(ms(120), kGuess);
+  buffer.bridge(ms(220), {Eigen::Vector3d(2, 0, 0), ms(120)});
+  EXPECT_TRUE(buffer.endsBridged());
+  EXPECT_TRUE(buffer.covers(ms(220)));
+  EXPECT_EQ(buffer.jumps(), 0U) << "the wheels have said nothing wrong";
+  buffer.insert(sample(ms(240), SE2(0.03, 0, 0)), {Eigen::Vector3d(3, 0, 0), ms(220)});
+  buffer.insert(sample(ms(260), SE2(0.05, 0, 0)));
+  EXPECT_FALSE(buffer.endsBridged());
+  const auto steps = buffer.steps(ms(10), ms(260));
+  EXPECT_EQ(knowledge(steps), "k???k");
+  EXPECT_EQ(buffer.jumps(), 1U);
+  for (const int i : {1, 2, 3}) EXPECT_EQ(steps[static_cast<std::size_t>(i)].guess->velocity.x(), i);
+  EXPECT_NEAR(motion({steps.back()}).x, 0.02, 1e-15);
+}
+
+TEST(OdometryBuffer, ABridgeMayBeTheBeginning) {
+  OdometryBuffer buffer;
+  buffer.bridge(ms(100), MotionGuess());
+  buffer.bridge(ms(200), MotionGuess());
+  const auto steps = buffer.steps(ms(100), ms(200));
+  EXPECT_EQ(knowledge(steps), "?");
+  EXPECT_EQ(steps[0].guess->since, ms(100));
+}
+
+/// One stamp from the future would make all that come after it too old.
+TEST(OdometryBuffer, ASampleFarAheadWaitsForTheNext) {
+  OdometryBuffer buffer = straight({0, 20});
+  EXPECT_EQ(buffer.insert(sample(ms(5000), SE2(0.03, 0, 0))), Insertion::kAhead);
+  EXPECT_EQ(buffer.insert(sample(ms(5000), SE2(0.03, 0, 0))), Insertion::kDuplicate);
+  EXPECT_EQ(buffer.newest(), ms(20));
+  EXPECT_EQ(buffer.insert(sample(ms(40), SE2(0.04, 0, 0))), Insertion::kInserted);
+  EXPECT_THAT(ends(buffer.steps(ms(0), ms(40))), testing::ElementsAre(20, 40)) << "its stamp was wrong: it is gone";
+
+  EXPECT_EQ(buffer.insert(sample(ms(6000), SE2(0.04, 0, 0))), Insertion::kAhead);
+  EXPECT_EQ(buffer.insert(sample(ms(6020), SE2(0.06, 0, 0))), Insertion::kInserted);
+  EXPECT_THAT(ends(buffer.steps(ms(0), ms(6020))), testing::ElementsAre(20, 40, 6000, 6020))
+      << "a silence: both are in";
+}
+
+TEST(OdometryBuffer, ASampleThatWaitsIsForgottenWhereItsTimeIsBridged) {
+  OdometryBuffer buffer = straight({0, 20});
+  EXPECT_EQ(buffer.insert(sample(ms(5000), SE2(0.03, 0, 0))), Insertion::kAhead);
+  buffer.bridge(ms(6000), kGuess);
+  buffer.discardBefore(ms(6000));
+  EXPECT_EQ(buffer.insert(sample(ms(9000), SE2(0.03, 0, 0))), Insertion::kAhead);
+  EXPECT_EQ(buffer.insert(sample(ms(9020), SE2(0.03, 0, 0))), Insertion::kInserted);
+  EXPECT_THAT(ends(buffer.steps(ms(6000), ms(9020))), testing::ElementsAre(9000, 9020));
+  EXPECT_EQ(buffer.oldest(), ms(6000));
+}
+
+TEST(OdometryBuffer, RefusesStampsThatAreNoTimes) {
+  OdometryBuffer buffer;
+  for (const Stamp none : {Stamp(-1), Stamp::min(), Stamp::max(), Stamp(std::chrono::hours(24 * 365 * 150))}) {
+    EXPECT_EQ(buffer.insert(sample(none, SE2())), Insertion::kNotFinite) << seconds(none);
+  }
+  EXPECT_EQ(buffer.insert(sample(Stamp(0), SE2())), Insertion::kInserted);
+  EXPECT_EQ(buffer.insert(sample(std::chrono::seconds(4294967295), SE2())), Insertion::kAhead);
+}
+
 TEST(OdometryBuffer, ClearedItBeginsAnew) {
   OdometryBuffer buffer = straight({0, 20});
   buffer.clear();

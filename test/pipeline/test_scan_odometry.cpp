@@ -176,8 +176,11 @@ TEST(ScanOdometry, AStatedTwistCovarianceThatIsNoneGivesWayToTheModel) {
   negative(2, 2) = -1.0;
   Eigen::Matrix3d not_a_number = 1e-2 * Eigen::Matrix3d::Identity();
   not_a_number(0, 1) = std::numeric_limits<double>::quiet_NaN();
+  Eigen::Matrix3d not_symmetric = 1e-2 * Eigen::Matrix3d::Identity();
+  not_symmetric(0, 1) = 5e-3;
   const Eigen::Matrix3d unknown = 1e6 * Eigen::Matrix3d::Identity();
-  for (const Eigen::Matrix3d& none : {Eigen::Matrix3d(Eigen::Matrix3d::Zero()), negative, not_a_number, unknown}) {
+  for (const Eigen::Matrix3d& none :
+       {Eigen::Matrix3d(Eigen::Matrix3d::Zero()), negative, not_a_number, not_symmetric, unknown}) {
     EXPECT_TRUE(matricesNear(afterOneStep(none, true), model, 0.0)) << "stated:\n" << none;
   }
 }

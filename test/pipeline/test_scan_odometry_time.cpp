@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 
 #include "pipeline/simulated_drive.h"
 
@@ -265,6 +266,156 @@ TEST(ScanOdometryTime, WithoutScansTheOdometryAtHandStaysShort) {
   driven.scan(29007);
   EXPECT_EQ(driven.reports.back().outcome, ScanOutcome::kReference);
 }
+
+// ---- stamps that are wrong ------------------------------------------------------------------------------------------
+
+TEST(ScanOdometryTime, OdometryOfStampZeroOrBeforeTheFirstIsTooOld) {
+  const SimulatedDrive drive;
+  Driven driven(drive);
+  driven.odometry(500);
+  OdometrySample sample = drive.odometry(0);
+  EXPECT_EQ(driven.pipeline.addOdometry(sample), Insertion::kTooOld);
+  sample.stamp = Stamp(0);
+  EXPECT_EQ(driven.pipeline.addOdometry(sample), Insertion::kTooOld);
+  EXPECT_EQ(driven.pipeline.latest()->stamp, at(500));
+  driven.run(500, 2000);
+  EXPECT_EQ(driven.count(ScanOutcome::kUpdated), 14U);
+}
+
+/// One sample from the future, and the next of now: the estimate does not follow it, and loses nothing.
+TEST(ScanOdometryTime, OdometryFromTheFutureIsNotFollowed) {
+  const SimulatedDrive drive;
+  Driven undisturbed(drive);
+  Driven driven(drive);
+  for (Driven* each : {&undisturbed, &driven}) each->odometry(0);
+  int ms = 0;
+  for (const int ahead : {1100, 9000, 3600000}) {
+    for (Driven* each : {&undisturbed, &driven}) each->run(ms, ms + 1000);
+    ms += 1000;
+    OdometrySample future = drive.odometry(ms);
+    future.stamp = at(ms + ahead);
+    EXPECT_EQ(driven.pipeline.addOdometry(future), Insertion::kAhead);
+    driven.process();
+    EXPECT_EQ(driven.pipeline.latest()->stamp, at(ms));
+  }
+  for (Driven* each : {&undisturbed, &driven}) each->run(ms, ms + 1000);
+  ASSERT_EQ(driven.reports.size(), undisturbed.reports.size());
+  for (std::size_t i = 0; i < driven.reports.size(); ++i) {
+    expectNear(*driven.reports[i].estimate, *undisturbed.reports[i].estimate, 0.0);
+  }
+}
+
+/// It waits for its time, and does not get into the way of others: not even if there are as many as may wait.
+TEST(ScanOdometryTime, ScansFromTheFutureWaitForTheirTime) {
+  const SimulatedDrive drive;
+  PipelineOptions options;
+  options.max_waiting_scans = 5;
+  Driven driven(drive, options);
+  driven.odometry(0);
+  driven.run(0, 1000);
+  for (int i = 0; i < 5; ++i) {
+    LaserScan future = drive.scan(2000);
+    future.stamp = at(900000 + i);
+    driven.scan(future);
+  }
+  driven.run(1000, 3000);
+  EXPECT_EQ(driven.count(ScanOutcome::kUpdated), 29U);
+  EXPECT_LE(driven.pipeline.waitingScans(), 5U);
+  for (const ScanReport& report : driven.reports) {
+    if (report.outcome == ScanOutcome::kNoOdometry) {
+      EXPECT_GE(report.stamp, at(900000));
+    }
+  }
+  EXPECT_LT(driven.latestError(3000).head<2>().norm(), 0.04);
+}
+
+TEST(ScanOdometryTime, AStampThatIsNoTimeIsRefusedWithTheValue) {
+  const SimulatedDrive drive;
+  Driven driven(drive);
+  driven.odometry(0);
+  driven.run(0, 1000);
+  for (const Stamp none : {Stamp(-5000000000), Stamp::min(), Stamp::max()}) {
+    LaserScan scan = drive.scan(1000);
+    scan.stamp = none;
+    expectIgnored(driven, scan, ScanOutcome::kUnusable, none == Stamp(-5000000000) ? "its stamp is -5 s" : "expected");
+    OdometrySample sample = drive.odometry(1000);
+    sample.stamp = none;
+    EXPECT_EQ(driven.pipeline.addOdometry(sample), Insertion::kNotFinite);
+  }
+  LaserScan zero = drive.scan(1000);
+  zero.stamp = Stamp(0);
+  expectIgnored(driven, zero, ScanOutcome::kNoOdometry, "older than the odometry");
+}
+
+/// Each scan three times: once used, twice out of order, and the estimate as if it had come once.
+TEST(ScanOdometryTime, ARepeatedScanCountsOnce) {
+  const SimulatedDrive drive;
+  Driven once(drive);
+  Driven thrice(drive);
+  for (Driven* each : {&once, &thrice}) each->odometry(0);
+  for (int ms = 1; ms <= 4000; ++ms) {
+    for (Driven* each : {&once, &thrice}) {
+      if (ms % 20 == 0) each->odometry(ms);
+      for (int i = 0; i < (each == &thrice ? 3 : 1) && ms % 100 == 7; ++i) each->scan(ms);
+    }
+  }
+  EXPECT_EQ(thrice.reports.size(), 3 * once.reports.size());
+  EXPECT_EQ(thrice.count(ScanOutcome::kOutOfOrder), 2 * once.reports.size());
+  EXPECT_EQ(thrice.count(ScanOutcome::kUpdated), once.count(ScanOutcome::kUpdated));
+  expectNear(*thrice.pipeline.latest(), *once.pipeline.latest(), 0.0);
+}
+
+/// Whatever comes in whatever order with whatever loss: every scan is in one report, and the estimate never goes back.
+struct Disorder {
+  const char* name;
+  int odometry_delay;  ///< [ms] at most
+  int scan_delay;      ///< [ms] at most
+  int lost;            ///< [%] of either
+  int repeated;        ///< [%] of either
+};
+void PrintTo(const Disorder& disorder, std::ostream* os) { *os << disorder.name; }
+
+class ScanOdometryDisorder : public ::testing::TestWithParam<Disorder> {};
+
+TEST_P(ScanOdometryDisorder, EveryScanIsAccountedForAndTheEstimateIsGood) {
+  const Disorder& disorder = GetParam();
+  const SimulatedDrive drive;
+  std::mt19937_64 random(7);
+  const auto upTo = [&random](int limit) { return std::uniform_int_distribution<int>(0, limit)(random); };
+  std::multimap<int, int> odometry;  // by the time of arrival
+  std::multimap<int, int> scans;
+  const auto send = [&](std::multimap<int, int>& messages, int ms, int delay) {
+    if (upTo(99) < disorder.lost) return;
+    messages.emplace(ms + upTo(delay), ms);
+    if (upTo(99) < disorder.repeated) messages.emplace(ms + upTo(delay), ms);
+  };
+  for (int ms = 20; ms <= 14000; ms += 20) send(odometry, ms, disorder.odometry_delay);
+  for (int ms = 107; ms <= 13000; ms += 100) send(scans, ms, disorder.scan_delay);
+
+  Driven driven(drive);
+  driven.odometry(0);
+  Stamp last_published(0);
+  for (int now = 0; now <= 15500; ++now) {
+    for (auto [it, end] = odometry.equal_range(now); it != end; ++it) driven.odometry(it->second);
+    for (auto [it, end] = scans.equal_range(now); it != end; ++it) driven.scan(it->second);
+    EXPECT_GE(driven.pipeline.latest()->stamp, last_published);
+    last_published = driven.pipeline.latest()->stamp;
+  }
+  EXPECT_EQ(driven.reports.size() + driven.pipeline.waitingScans(), scans.size());
+  for (const ScanReport& report : driven.reports) {
+    if (!report.estimate) continue;
+    const Eigen::Vector3d e = error(report.estimate->odom_from_base, drive.truth(milliseconds(report.stamp)));
+    EXPECT_LT(e.head<2>().norm(), 0.06) << "at " << milliseconds(report.stamp) << " ms: " << e.transpose();
+  }
+  const auto used = static_cast<double>(driven.count(ScanOutcome::kUpdated));
+  EXPECT_GT(used, 40.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Cases, ScanOdometryDisorder,
+                         ::testing::Values(Disorder{"OdometryLate", 300, 0, 0, 0}, Disorder{"ScansLate", 0, 300, 0, 0},
+                                           Disorder{"BothLate", 150, 150, 0, 0}, Disorder{"Lost", 0, 0, 30, 0},
+                                           Disorder{"Repeated", 20, 20, 0, 50}, Disorder{"All", 150, 150, 20, 30}),
+                         [](const auto& info) { return info.param.name; });
 
 }  // namespace
 }  // namespace sckf::test

@@ -12,11 +12,12 @@ using Stamp = std::chrono::nanoseconds;
 inline double seconds(Stamp duration) { return std::chrono::duration<double>(duration).count(); }
 
 /// Beam i looks along angle_min + i · angle_increment in the plane of the laser, counter-clockwise about its z axis.
-/// A range that is not finite or not within [range_min, range_max] is "no reading" (REP-117).
+/// A range that is not finite or not within [range_min, range_max) is "no reading" (REP-117; the largest range itself
+/// is what many drivers say where they have seen nothing).
 struct LaserScan {
   Stamp stamp{0};
-  double angle_min = 0.0;        ///< [rad]
-  double angle_increment = 0.0;  ///< [rad], may be negative, not zero
+  double angle_min = 0.0;        ///< [rad], within two turns
+  double angle_increment = 0.0;  ///< [rad], may be negative, not zero; all beams within a turn
   double range_min = 0.0;        ///< [m]
   double range_max = 0.0;        ///< [m]
   std::vector<float> ranges;     ///< [m]

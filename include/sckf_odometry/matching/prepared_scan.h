@@ -16,17 +16,18 @@ namespace sckf {
 
 struct ScanOptions {
   double range_min = 0.0;         ///< [m] readings below are ignored; the scan's own range_min holds too
-  double range_max = 80.0;        ///< [m] readings above are ignored; the scan's own range_max holds too
+  double range_max = 80.0;        ///< [m] readings of this or above are ignored; the scan's own range_max holds too
   double range_noise_min = 0.01;  ///< [m] std of a range: no scan is believed to be better than this …
   double range_noise_max = 0.10;  ///< [m] … nor worse than this; in between, the scan itself tells
   int min_points = 20;            ///< a scan with fewer readings is not usable
+  int max_beams = 4000;           ///< of a scan with more, every second beam is used, or every third, …
   SurfaceOptions surface;
 };
 
 /// Everything is in base_link, projected to its x-y plane. Point i comes from beam points.beam[i].
 struct PreparedScan {
   Stamp stamp{0};
-  std::size_t beams = 0;             ///< M: number of ranges of the scan, read or not
+  std::size_t beams = 0;             ///< M: number of ranges used of the scan, read or not
   double range_noise = 0.0;          ///< std of one range, estimated from this scan [m]
   ScannedPoints points;              ///< the readings
   std::vector<Surface> surface;      ///< the surface around each point

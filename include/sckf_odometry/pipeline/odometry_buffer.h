@@ -48,6 +48,7 @@ class OdometryBuffer {
   void bridge(Stamp stamp, const MotionGuess& guess);
 
   bool empty() const { return samples_.empty(); }
+  std::size_t size() const { return samples_.size(); }
   Stamp oldest() const { return samples_.front().stamp; }
   Stamp newest() const { return samples_.back().stamp; }
   bool covers(Stamp stamp) const { return !empty() && oldest() <= stamp && stamp <= newest(); }

@@ -117,6 +117,8 @@ class ScanOdometry {
   /// Steps of the wheels that were not taken for motion.
   std::size_t odometryJumps() const { return odometry_.jumps(); }
 
+  std::size_t waitingScans() const { return waiting_.size(); }
+  const OdometryBuffer& odometry() const { return odometry_; }  ///< what is kept of it
   const PipelineOptions& options() const { return options_; }
 
  private:
