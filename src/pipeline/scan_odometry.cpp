@@ -198,6 +198,7 @@ bool ScanOdometry::fuse(ScanReport& report) {
   const Displacement& displacement = *report.match.displacement;
   const double bound = chiSquared(displacement.dimension(), options_.gate.probability);
   report.innovation = filter_->innovation(displacement);
+  report.nis_bound = bound;
   report.outcome = ScanOutcome::kUpdated;
   if (report.innovation->nis() > bound && looksLikeSlip(report.match)) {
     const Eigen::Vector3d std(options_.gate.slip_std_translation, options_.gate.slip_std_translation,

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "sckf_odometry/core/covariance.h"
+
 namespace sckf {
 
 namespace {
@@ -94,6 +96,10 @@ LaserScan toScan(const sensor_msgs::LaserScan& message) {
   return scan;
 }
 
+bool isTurnedRound(const sensor_msgs::LaserScan& message) {
+  return (message.angle_max - message.angle_min) * message.angle_increment < 0.0F;
+}
+
 std::optional<SE2> toPlanar(const geometry_msgs::Pose& pose, std::string* problem) {
   return planar(pose.position.x, pose.position.y, pose.orientation, problem);
 }
@@ -135,6 +141,32 @@ OdometrySample moved(const OdometrySample& sample, const SE2& child_from_base) {
     result.twist_covariance = J_base_child * *sample.twist_covariance * J_base_child.transpose();
   }
   return result;
+}
+
+std::string covarianceProblem(const MessageCovariance& covariance) {
+  const Eigen::Matrix3d planar = toPlanarCovariance(covariance);
+  if (isCovariance(planar)) return "";
+  const Eigen::IOFormat in_one_line(6, Eigen::DontAlignCols, ", ", "; ", "", "", "[", "]");
+  std::ostringstream text;
+  text << "covariance of x, y, yaw " << planar.format(in_one_line)
+       << ": finite, symmetric and without negative eigenvalue expected";
+  return text.str();
+}
+
+std::optional<GivenPose> toGivenPose(const geometry_msgs::PoseWithCovarianceStamped& message,
+                                     const std::string& odom_frame, std::string* problem) {
+  if (frameName(message.header.frame_id) != odom_frame) {
+    *problem = "header.frame_id is \"" + message.header.frame_id + "\": \"" + odom_frame + "\" expected";
+    return std::nullopt;
+  }
+  const std::optional<SE2> pose = toPlanar(message.pose.pose, problem);
+  if (!pose) return std::nullopt;
+  const std::string covariance_problem = covarianceProblem(message.pose.covariance);
+  if (!covariance_problem.empty()) {
+    *problem = covariance_problem;
+    return std::nullopt;
+  }
+  return GivenPose{*pose, toPlanarCovariance(message.pose.covariance), toStamp(message.header.stamp)};
 }
 
 nav_msgs::Odometry toOdometryMessage(const Estimate& estimate, const std::string& odom_frame,
@@ -185,6 +217,32 @@ sensor_msgs::PointCloud2 toPointCloud(const std::vector<Eigen::Vector2d>& points
     ++out;
   }
   return cloud;
+}
+
+sckf_odometry::Status toStatus(const ScanReport& report, const std::string& method, const std::string& odom_frame,
+                               const ros::Time& now) {
+  sckf_odometry::Status status;
+  status.header.stamp = toTime(report.stamp);
+  status.header.frame_id = odom_frame;
+  status.method = method;
+  status.outcome = toString(report.outcome);
+  status.reason = report.reason;
+  status.accepted = report.outcome == ScanOutcome::kUpdated || report.outcome == ScanOutcome::kSlip;
+  status.new_reference = report.new_reference;
+  status.wheels_known = report.wheels_known;
+  status.pairs = static_cast<uint32_t>(report.match.pairs.size());
+  status.overlap = report.match.overlap;
+  status.residual_rms = report.match.residual_rms;
+  if (report.innovation) {
+    status.dimension = static_cast<uint8_t>(report.innovation->residual.size());
+    status.nis = report.innovation->nis();
+    status.nis_bound = report.nis_bound;
+  }
+  if (report.reference_stamp != Stamp(0)) status.reference_age = seconds(report.stamp - report.reference_stamp);
+  status.match_time = report.match_time;
+  status.total_time = report.total_time;
+  status.latency = now.toSec() - toTime(report.stamp).toSec();
+  return status;
 }
 
 geometry_msgs::TransformStamped toTransform(const SE2& frame_from_child, Stamp stamp, const std::string& frame,

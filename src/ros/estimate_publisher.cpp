@@ -66,6 +66,10 @@ void EstimatePublisher::publishViews() {
 
 void EstimatePublisher::restart() {
   last_published_.reset();
+  clearViews();
+}
+
+void EstimatePublisher::clearViews() {
   odom_from_wheels_.reset();
   path_recorder_ = PathRecorder(options_.path_distance, options_.path_max_poses);
   wheels_recorder_ = path_recorder_;

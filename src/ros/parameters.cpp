@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "sckf_odometry/ros/conversions.h"
 
@@ -24,7 +26,7 @@ bool isWhole(const Parameter& parameter) {
 std::string expectation(const Parameter& parameter) {
   if (std::holds_alternative<bool*>(parameter.field)) return "true or false";
   if (!isNumber(parameter)) {
-    if (parameter.choices.empty()) return "a text that is not empty";
+    if (parameter.choices.empty()) return parameter.may_be_empty ? "a text" : "a text that is not empty";
     std::string text = "one of";
     for (const std::string& choice : parameter.choices) text += " \"" + choice + "\"";
     return text;
@@ -53,7 +55,7 @@ bool assign(const Parameter& parameter, const ParameterValue& value) {
   }
   if (const auto* field = std::get_if<std::string*>(&parameter.field)) {
     const auto* text = std::get_if<std::string>(&value.value);
-    if (text == nullptr || text->empty()) return false;
+    if (text == nullptr || (text->empty() && !parameter.may_be_empty)) return false;
     const auto& choices = parameter.choices;
     if (!choices.empty() && std::find(choices.begin(), choices.end(), *text) == choices.end()) return false;
     **field = *text;
@@ -66,6 +68,47 @@ bool assign(const Parameter& parameter, const ParameterValue& value) {
   if (const auto* field = std::get_if<std::size_t*>(&parameter.field)) **field = static_cast<std::size_t>(*real);
   if (const auto* field = std::get_if<double*>(&parameter.field)) **field = *real;
   return true;
+}
+
+using Values = std::map<std::string, ParameterValue>;
+
+/// Gives what is set by another package's name the name that it has here, unless that is set too.
+void resolveAliases(Values& values, std::vector<std::string>& warnings) {
+  for (const auto& [alias, name] : parameterAliases()) {
+    const auto given = values.find(alias);
+    if (given == values.end()) continue;
+    const auto [ours, taken] = values.emplace(name, given->second);
+    warnings.push_back("parameter " + alias + " = " + given->second.text + ": it is called " + name + " here" +
+                       (taken ? "" : ", and is set to " + ours->second.text + ", which holds"));
+    values.erase(given);
+  }
+}
+
+/// The number of letters to insert, to drop or to exchange to make one word the other.
+std::size_t editDistance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), 0);
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = std::exchange(row[0], i);
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t exchanged = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = std::exchange(row[j], std::min({row[j] + 1, row[j - 1] + 1, exchanged}));
+    }
+  }
+  return row.back();
+}
+
+/// The parameter that a misspelt name is nearest to; empty if it is near to none.
+std::string nearestName(const std::string& name, const std::vector<Parameter>& parameters) {
+  std::string nearest;
+  std::size_t distance = std::max<std::size_t>(2, name.size() / 3) + 1;
+  for (const Parameter& parameter : parameters) {
+    const std::size_t d = editDistance(name, parameter.name);
+    if (d >= distance) continue;
+    distance = d;
+    nearest = parameter.name;
+  }
+  return nearest;
 }
 
 /// What no parameter says alone.
@@ -105,11 +148,13 @@ std::string Range::text() const {
   return text.str();
 }
 
-Options readOptions(const ParameterSource& source, std::vector<std::string>* unknown) {
-  Options options;
+Options readOptions(const ParameterSource& source, std::vector<std::string>* warnings, Options options) {
   std::vector<std::string> problems;
-  std::map<std::string, ParameterValue> values = source.values();
-  for (const Parameter& parameter : parameterList(options)) {
+  std::vector<std::string> remarks;
+  Values values = source.values();
+  resolveAliases(values, remarks);
+  const std::vector<Parameter> parameters = parameterList(options);
+  for (const Parameter& parameter : parameters) {
     const auto given = values.find(parameter.name);
     if (given == values.end()) continue;
     if (!assign(parameter, given->second)) {
@@ -117,9 +162,12 @@ Options readOptions(const ParameterSource& source, std::vector<std::string>* unk
     }
     values.erase(given);
   }
-  if (unknown != nullptr) {
-    for (const auto& entry : values) unknown->push_back(entry.first);
+  for (const auto& [name, value] : values) {
+    const std::string nearest = nearestName(name, parameters);
+    remarks.push_back("unknown parameter " + name + ": no effect; " +
+                      (nearest.empty() ? "the names are in config/sckf_odometry.yaml" : "is " + nearest + " meant?"));
   }
+  if (warnings != nullptr) *warnings = remarks;
   NodeOptions& node = options.node;
   for (std::string* frame : {&node.odom_frame, &node.base_frame, &node.tf_odometry_frame}) *frame = frameName(*frame);
   checkTogether(options, problems);

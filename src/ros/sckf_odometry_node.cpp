@@ -6,6 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "sckf_odometry/Status.h"
 #include "sckf_odometry/ros/conversions.h"
 
 namespace sckf {
@@ -13,7 +14,7 @@ namespace sckf {
 namespace {
 
 constexpr char kLogger[] = "sckf_odometry";
-constexpr std::size_t kConfirmations = 3;  // so many stamps in a row are a jump in time and not a wrong stamp
+constexpr uint32_t kQueue = 1000;  // at fast replay many messages leave in one go
 
 Stamp toDuration(double seconds) { return std::chrono::duration_cast<Stamp>(std::chrono::duration<double>(seconds)); }
 
@@ -32,11 +33,10 @@ NodeOptions withOdometryOnTf(NodeOptions options) {
 }
 
 Options readOptions(const ros::NodeHandle& private_nh) {
-  std::vector<std::string> unknown;
-  Options options = readOptions(ParameterServer(private_nh), &unknown);
-  for (const std::string& name : unknown) {
-    ROS_WARN_STREAM_NAMED(kLogger, "unknown parameter " << private_nh.resolveName(name)
-                                                        << ": no effect; the names are in config/sckf_odometry.yaml");
+  std::vector<std::string> warnings;
+  Options options = readOptions(ParameterServer(private_nh), &warnings);
+  for (const std::string& warning : warnings) {
+    ROS_WARN_STREAM_NAMED(kLogger, private_nh.getNamespace() << ": " << warning);
   }
   options.node = withOdometryOnTf(options.node);
   return options;
@@ -46,16 +46,26 @@ Options readOptions(const ros::NodeHandle& private_nh) {
 
 ScKfOdometryNode::ScKfOdometryNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     : options_(readOptions(private_nh)),
+      scan_topic_(nh.resolveName("scan")),
+      odometry_source_(options_.node.use_tf_odometry ? "TF" : nh.resolveName("odom")),
       pipeline_(std::make_unique<ScanOdometry>(options_.pipeline)),
       tf_(options_.node.base_frame, options_.node.use_tf_odometry ? options_.node.tf_odometry_frame : "",
           toDuration(options_.node.time_jump)),
       publisher_(nh, options_.node),
       debug_view_(nh, options_.node),
+      status_publisher_(nh.advertise<sckf_odometry::Status>("status", kQueue)),
+      health_(odometry_source_, scan_topic_),
+      pose_keeper_(options_.node),
+      gate_(options_.node, odometry_source_, scan_topic_, health_, warnings_),
       diagnostics_(nh, private_nh, private_nh.getNamespace()),
-      scan_topic_(nh.resolveName("scan")),
-      odometry_topic_(nh.resolveName("odom")) {
-  subscribe(nh);
+      services_(nh, private_nh, serviceActions()),
+      reconfigure_(private_nh, options_, [this](const Options& options) { onOptions(options); }) {
   startTimers(nh);
+  subscribe(nh);
+}
+
+ScKfOdometryNode::~ScKfOdometryNode() {
+  guarded([this] { keepPose(); });
 }
 
 void ScKfOdometryNode::subscribe(ros::NodeHandle& nh) {
@@ -78,16 +88,30 @@ void ScKfOdometryNode::subscribe(ros::NodeHandle& nh) {
 }
 
 void ScKfOdometryNode::startTimers(ros::NodeHandle& nh) {
-  if (options_.node.visualization_rate > 0.0) {
-    view_timer_ = nh.createWallTimer(ros::WallDuration(1.0 / options_.node.visualization_rate),
-                                     &ScKfOdometryNode::onViewTimer, this);
-  }
+  const auto every = [&nh](double period, const std::function<void()>& action) {
+    const boost::function<void(const ros::WallTimerEvent&)> callback = [action](const ros::WallTimerEvent&) {
+      action();
+    };
+    return nh.createWallTimer(ros::WallDuration(period), callback);
+  };
   diagnostics_.setHardwareID("none");
   diagnostics_.add("odometry", this, &ScKfOdometryNode::diagnose);
-  const boost::function<void(const ros::WallTimerEvent&)> update = [this](const ros::WallTimerEvent&) {
-    diagnostics_.force_update();
+  timers_.push_back(every(1.0, [this] { diagnostics_.force_update(); }));
+  timers_.push_back(every(1.0, [this] { guarded([this] { keepPose(); }); }));
+  view_timer_ = every(1.0, [this] { guarded([this] { publisher_.publishViews(); }); });
+  setViewRate();
+}
+
+Services::Actions ScKfOdometryNode::serviceActions() {
+  Services::Actions actions;
+  actions.reset = [this] { guarded([this] { reset(); }); };
+  actions.set_pose = [this](const geometry_msgs::PoseWithCovarianceStamped& message) {
+    std::string problem = "it failed, see the log";
+    guarded([&] { problem = setPose(message); });
+    return problem;
   };
-  diagnostic_timer_ = nh.createWallTimer(ros::WallDuration(1.0), update);
+  actions.pause = [this](bool paused) { guarded([this, paused] { pause(paused); }); };
+  return actions;
 }
 
 template <typename Callback>
@@ -100,24 +124,18 @@ void ScKfOdometryNode::guarded(const Callback& callback) {
   }
 }
 
-void ScKfOdometryNode::onScan(const sensor_msgs::LaserScan::ConstPtr& message) {
+void ScKfOdometryNode::onScan(const Scan& message) {
   guarded([&] {
-    if (message->header.stamp.isZero()) return refuseScan("header.stamp is 0: the time of the first beam expected");
-    if (message->header.frame_id.empty()) return refuseScan("header.frame_id is empty: the laser's frame expected");
-    scans_without_mount_.push_back(message);
+    const InputGate::Scans admission = gate_.admit(message);
+    // Without odometry it is the scans that tell the time.
+    if (admission.time_jump < Stamp(0) && pipeline_->onScansAlone()) followTime(admission.time_jump);
+    for (const Scan& scan : admission.passed) scans_without_mount_.push_back(scan);
     advance();
   });
 }
 
 void ScKfOdometryNode::onOdometry(const nav_msgs::Odometry::ConstPtr& message) {
-  guarded([&] {
-    if (message->header.stamp.isZero()) return refuseOdometry("header.stamp is 0: the time of the reading expected");
-    std::string problem;
-    std::optional<OdometrySample> sample = toOdometrySample(*message, &problem);
-    if (sample) sample = tf_.inBaseFrame(*sample, frameName(message->child_frame_id), &problem);
-    if (!sample) return refuseOdometry(problem);
-    addOdometry(*sample);
-  });
+  guarded([&] { addOdometry(gate_.admit(*message, options_.pipeline.prefer_twist_covariance, tf_)); });
 }
 
 void ScKfOdometryNode::onTransforms(const ros::MessageEvent<const tf2_msgs::TFMessage>& event, bool is_static) {
@@ -125,125 +143,146 @@ void ScKfOdometryNode::onTransforms(const ros::MessageEvent<const tf2_msgs::TFMe
     tf_.add(*event.getConstMessage(), is_static);
     warnOfSecondParent(event);
     if (options_.node.use_tf_odometry) {
-      for (const OdometrySample& sample : tf_.takeOdometry()) addOdometry(sample);
+      for (const OdometrySample& sample : tf_.takeOdometry()) addOdometry(gate_.admit(sample));
     }
     if (!scans_without_mount_.empty()) advance();
   });
 }
 
-void ScKfOdometryNode::onViewTimer(const ros::WallTimerEvent&) {
-  guarded([&] { publisher_.publishViews(); });
+void ScKfOdometryNode::onOptions(const Options& options) {
+  guarded([&] {
+    pipeline_->setOptions(options.pipeline);
+    options_ = options;
+    setViewRate();
+  });
+}
+
+void ScKfOdometryNode::setViewRate() {
+  const double rate = options_.node.visualization_rate;
+  if (rate <= 0.0) return view_timer_.stop();
+  view_timer_.setPeriod(ros::WallDuration(1.0 / rate));
+  view_timer_.start();
+}
+
+void ScKfOdometryNode::addOdometry(const InputGate::Samples& admission) {
+  if (admission.time_jump != Stamp(0)) followTime(admission.time_jump);
+  for (const OdometrySample& sample : admission.passed) addOdometry(sample);
 }
 
 void ScKfOdometryNode::addOdometry(const OdometrySample& sample) {
-  if (isHeldBack(sample)) return;
-  newest_odometry_ = std::max(newest_odometry_, sample.stamp);
-  ++counts_.odometry;
+  if (paused_) return health_.odometry.ended("paused");
+  if (!pipeline_->latest()) {
+    if (const auto saved = pose_keeper_.takeUp(sample.stamp)) {
+      pipeline_->setPose(saved->odom_from_base, saved->covariance, sample.stamp);
+    }
+  }
   switch (pipeline_->addOdometry(sample)) {
     case OdometryBuffer::Insertion::kInserted:
+      health_.odometry.ended("used");
       break;
     case OdometryBuffer::Insertion::kDuplicate:
-      ++counts_.odometry_refused;
-      break;
+      return gate_.refuseOdometry("duplicate", "there is one of the same stamp already");
     case OdometryBuffer::Insertion::kTooOld:
-      refuseOdometry("it came after a scan that was taken later");
-      break;
+      return gate_.refuseOdometry("too late", "it came after a scan that was taken later");
     case OdometryBuffer::Insertion::kNotFinite:
-      refuseOdometry("its pose is not finite");
-      break;
+      return gate_.refuseOdometry("no pose", "its pose is not finite");
     case OdometryBuffer::Insertion::kAhead:
-      break;  // the next one tells whether its stamp is right
+      return health_.odometry.ended("ahead");  // the next one tells whether its stamp is right
   }
   advance();
   publisher_.addWheels(sample);
 }
 
-bool ScKfOdometryNode::isHeldBack(const OdometrySample& sample) {
-  const Stamp back = toDuration(options_.node.time_jump);
-  const auto isNear = [back](Stamp stamp, Stamp other) { return stamp + back >= other && stamp <= other + 10 * back; };
-  if (newest_odometry_ == Stamp(0) || isNear(sample.stamp, newest_odometry_)) {
-    held_back_.clear();
-    return false;
-  }
-  if (!held_back_.empty() && !isNear(sample.stamp, held_back_.back().stamp)) held_back_.clear();
-  held_back_.push_back(sample);
-  if (held_back_.size() >= kConfirmations) {
-    acceptHeldBack();
-  } else {
-    std::ostringstream text;
-    text << "its stamp differs by " << seconds(sample.stamp - newest_odometry_) << " s from the newest";
-    refuseOdometry(text.str());
-  }
-  return true;
-}
-
-void ScKfOdometryNode::acceptHeldBack() {
-  const std::vector<OdometrySample> samples = std::move(held_back_);
-  held_back_.clear();
-  const double jump = seconds(samples.front().stamp - newest_odometry_);
-  newest_odometry_ = samples.front().stamp;
-  if (jump < 0.0) {
-    ROS_WARN_STREAM_NAMED(kLogger, "time went back by " << -jump << " s: the estimate starts again");
-    restart();
-  }
-  for (const OdometrySample& sample : samples) addOdometry(sample);
-}
-
-void ScKfOdometryNode::restart() {
-  pipeline_ = std::make_unique<ScanOdometry>(options_.pipeline);
-  publisher_.restart();
-  if (!options_.node.use_tf_odometry) tf_.clear();  // there it has noticed by itself, and has begun anew already
-}
-
-void ScKfOdometryNode::refuseScan(const std::string& reason) {
-  ++counts_.scans_refused;
-  warnings_.warn("scan", "scan on " + scan_topic_ + " not used: " + reason);
-}
-
-void ScKfOdometryNode::refuseOdometry(const std::string& reason) {
-  ++counts_.odometry_refused;
-  const std::string source = options_.node.use_tf_odometry ? "TF" : odometry_topic_;
-  warnings_.warn("odometry", "odometry on " + source + " not used: " + reason);
-}
-
 void ScKfOdometryNode::advance() {
   passScansWithMount();
-  const ros::SteadyTime begin = ros::SteadyTime::now();
-  const std::vector<ScanReport> reports = pipeline_->process();
-  const double time = (ros::SteadyTime::now() - begin).toSec();
-  for (const ScanReport& report : reports) account(report);
-  if (!reports.empty()) {
-    counts_.scans_timed += reports.size();
-    counts_.scan_time += time;
-    counts_.scan_time_max = std::max(counts_.scan_time_max, time / static_cast<double>(reports.size()));
-  }
+  for (const ScanReport& report : pipeline_->process()) account(report);
+  if (paused_) return;
   if (const auto latest = pipeline_->latest()) publisher_.publish(*latest);
 }
 
 void ScKfOdometryNode::passScansWithMount() {
-  std::deque<sensor_msgs::LaserScan::ConstPtr> waiting;
-  for (const auto& message : scans_without_mount_) {
-    const std::string frame = frameName(message->header.frame_id);
-    if (const auto base_from_laser = tf_.baseFrom(frame, &mount_problem_)) {
+  std::deque<Scan> waiting;
+  for (const Scan& message : scans_without_mount_) {
+    if (paused_) {
+      health_.scans.ended("paused");
+    } else if (const auto base_from_laser = tf_.baseFrom(frameName(message->header.frame_id), &mount_problem_)) {
       pipeline_->addScan(toScan(*message), *base_from_laser);
+      health_.scanPassed();
     } else {
       waiting.push_back(message);
     }
   }
   scans_without_mount_ = std::move(waiting);
   if (scans_without_mount_.size() <= static_cast<std::size_t>(options_.pipeline.max_waiting_scans)) return;
-  refuseScan("its mount is not known: " + mount_problem_);
+  gate_.refuseScan("no mount", "its mount is not known: " + mount_problem_);
   scans_without_mount_.pop_front();
 }
 
 void ScKfOdometryNode::account(const ScanReport& report) {
-  ++counts_.scans[report.outcome];
-  last_scan_ = toString(report.outcome) + (report.reason.empty() ? "" : ": " + report.reason);
-  if (!report.reason.empty()) warnings_.warn("scan", "scan on " + scan_topic_ + " not used: " + last_scan_);
+  health_.scanTaken(report);
+  status_publisher_.publish(toStatus(report, options_.pipeline.method, options_.node.odom_frame, ros::Time::now()));
+  if (!report.reason.empty()) {
+    const std::string outcome = toString(report.outcome);
+    warnings_.warn("scan " + outcome, "scan on " + scan_topic_ + " not used: " + outcome + ": " + report.reason);
+  }
   debug_view_.show(report);
   if (!report.estimate) return;
   publisher_.publish(*report.estimate);
   publisher_.publishScan(*report.estimate, report.scan.get());
+}
+
+void ScKfOdometryNode::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, const std::string& reason) {
+  health_.pipelineDropped(reason, pipeline_->odometryJumps());
+  health_.scans.ended(reason, scans_without_mount_.size());
+  scans_without_mount_.clear();
+  pipeline_ = std::make_unique<ScanOdometry>(options_.pipeline, odom_from_base, covariance);
+}
+
+void ScKfOdometryNode::followTime(Stamp jump) {
+  health_.timeJumped(seconds(jump));
+  if (jump > Stamp(0)) {
+    ROS_WARN_STREAM_NAMED(kLogger, "time went ahead by " << seconds(jump) << " s: the estimate goes on");
+    return;
+  }
+  ROS_WARN_STREAM_NAMED(kLogger, "time went back by " << -seconds(jump) << " s: the estimate starts again");
+  begin(SE2(), Eigen::Matrix3d::Zero(), "dropped, time went back");
+  gate_.restart();
+  publisher_.restart();
+  if (!options_.node.use_tf_odometry) tf_.clear();  // there it has noticed by itself, and has begun anew already
+}
+
+void ScKfOdometryNode::reset() {
+  ROS_INFO_NAMED(kLogger, "reset: the estimate starts again");
+  pose_keeper_.forget();
+  begin(SE2(), Eigen::Matrix3d::Zero(), "dropped, reset");
+  publisher_.clearViews();
+}
+
+std::string ScKfOdometryNode::setPose(const geometry_msgs::PoseWithCovarianceStamped& message) {
+  std::string problem;
+  const std::optional<GivenPose> pose = toGivenPose(message, options_.node.odom_frame, &problem);
+  if (!pose) {
+    ROS_WARN_STREAM_NAMED(kLogger, "set_pose refused: " << problem);
+    return problem;
+  }
+  pose_keeper_.forget();
+  pipeline_->setPose(pose->odom_from_base, pose->covariance, pose->stamp);
+  publisher_.clearViews();
+  ROS_INFO_STREAM_NAMED(kLogger, "pose set to " << pose->odom_from_base.vector().transpose());
+  return "";
+}
+
+void ScKfOdometryNode::pause(bool paused) {
+  if (paused == paused_) return;
+  ROS_INFO_STREAM_NAMED(kLogger, (paused ? "paused" : "resumed"));
+  paused_ = paused;
+  keepPose();
+  // It goes on from where it is, whatever the wheels say then.
+  if (const auto latest = pipeline_->latest()) begin(latest->odom_from_base, latest->covariance, "paused");
+}
+
+void ScKfOdometryNode::keepPose() {
+  if (const auto latest = pipeline_->latest()) pose_keeper_.keep(*latest);
 }
 
 void ScKfOdometryNode::warnOfSecondParent(const ros::MessageEvent<const tf2_msgs::TFMessage>& event) {
@@ -261,40 +300,31 @@ void ScKfOdometryNode::warnOfSecondParent(const ros::MessageEvent<const tf2_msgs
 
 std::string ScKfOdometryNode::waitingFor() const {
   const NodeOptions& node = options_.node;
-  if (counts_.odometry == 0 && node.use_tf_odometry) {
+  if (health_.odometry.received() == 0 && node.use_tf_odometry) {
     return "odometry on TF, " + node.tf_odometry_frame + " -> " + node.base_frame + " " + tf_.odometryProblem();
   }
-  if (counts_.odometry == 0) return "odometry on " + odometry_topic_;
+  if (health_.odometry.received() == 0) return "odometry on " + odometry_source_;
   if (!scans_without_mount_.empty()) return "the mount of the laser: " + mount_problem_;
-  if (counts_.scans.empty()) return "scans on " + scan_topic_;
+  if (health_.scans.received() == 0) return "scans on " + scan_topic_;
   return "";
 }
 
 void ScKfOdometryNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   guarded([&] {
-    using Status = diagnostic_msgs::DiagnosticStatus;
-    const std::string waiting = waitingFor();
-    if (!waiting.empty()) {
-      status.summary(Status::WARN, "waiting for " + waiting);
-      warnings_.warn("waiting", "waiting for " + waiting);
-    } else {
-      status.summary(Status::OK, "estimating");
+    using Level = diagnostic_msgs::DiagnosticStatus;
+    Health::Conditions conditions;
+    conditions.waiting_for = waitingFor();
+    conditions.paused = paused_;
+    conditions.scans_alone = pipeline_->onScansAlone();
+    conditions.odometry_jumps = pipeline_->odometryJumps();
+    conditions.odometry_held_back = gate_.odometryHeldBack();
+    conditions.scans_held_back = gate_.scansHeldBack();
+    conditions.scans_without_mount = scans_without_mount_.size();
+    conditions.newest_odometry = gate_.newestOdometry();
+    for (const Health::Finding& finding : health_.report(conditions, options_, ros::Time::now(), status)) {
+      finding.level == Level::ERROR ? warnings_.error(finding.kind, finding.text)
+                                    : warnings_.warn(finding.kind, finding.text);
     }
-    std::size_t scans = counts_.scans_refused;
-    for (const auto& [outcome, count] : counts_.scans) {
-      status.add("scans: " + toString(outcome), count);
-      scans += count;
-    }
-    status.add("scans: refused", counts_.scans_refused);
-    status.add("scans: together", scans);
-    status.add("scans: waiting for their mount", scans_without_mount_.size());
-    status.add("last scan", last_scan_);
-    status.add("odometry: messages", counts_.odometry);
-    status.add("odometry: refused", counts_.odometry_refused);
-    if (counts_.scans_timed == 0) return;
-    status.addf("time of a scan, mean [ms]", "%.3f",
-                1e3 * counts_.scan_time / static_cast<double>(counts_.scans_timed));
-    status.addf("time of a scan, longest [ms]", "%.3f", 1e3 * counts_.scan_time_max);
   });
 }
 

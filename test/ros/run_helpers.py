@@ -8,11 +8,13 @@ import time
 
 import numpy as np
 import rosgraph
+import roslib.packages
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry, Path
 from rosgraph_msgs.msg import Log
+from sckf_odometry.msg import Status
 from sensor_msgs.msg import LaserScan, PointCloud2
 from tf2_msgs.msg import TFMessage
 
@@ -64,6 +66,7 @@ class Recorder:
         'path': Path,
         'path_odometry': Path,
         'cloud': PointCloud2,
+        'status': Status,
     }
 
     def __init__(self, namespace='', node_name='sckf_odometry'):
@@ -72,6 +75,7 @@ class Recorder:
         self._transforms = []
         self._log = []
         self._diagnostics = {}
+        self._levels = []
         self._node_name = node_name
         for topic, kind in self.TOPICS.items():
             rospy.Subscriber(namespace + topic, kind, self._record, topic, queue_size=None, tcp_nodelay=True)
@@ -93,6 +97,7 @@ class Recorder:
             if status.name.startswith(self._node_name + ':'):
                 with self._lock:
                     self._diagnostics = {entry.key: entry.value for entry in status.values}
+                    self._levels.append((status.level, status.message))
 
     def messages(self, topic):
         with self._lock:
@@ -105,6 +110,11 @@ class Recorder:
     def diagnostics(self):
         with self._lock:
             return dict(self._diagnostics)
+
+    def levels(self):
+        """Level and summary of each report of the diagnostics."""
+        with self._lock:
+            return list(self._levels)
 
     def log(self, part):
         """Lines of the log that contain this text."""
@@ -139,6 +149,24 @@ def read_tum(path):
     """Stamps [s], and n × 3 poses, of a file with lines of: stamp x y z qx qy qz qw."""
     rows = np.loadtxt(path, ndmin=2)
     return rows[:, 0], np.column_stack([rows[:, 1], rows[:, 2], 2 * np.arctan2(rows[:, 6], rows[:, 7])])
+
+
+def load_nodelet(manager, name, **parameters):
+    """The process that keeps a nodelet of that name in the manager until it is terminated."""
+    for key, value in parameters.items():
+        rospy.set_param('%s/%s' % (name, key), value)
+    namespace, _, node = name.rpartition('/')
+    tool = roslib.packages.find_node('nodelet', 'nodelet')[0]
+    return subprocess.Popen([tool, 'load', 'sckf_odometry/ScKfOdometryNodelet', manager, '__name:=' + node,
+                             '__ns:=' + (namespace or '/')])
+
+
+def accounted(diagnostics, kind, received):
+    """Whether every message of a kind, 'scans' or 'odometry', has come, and ended or waits."""
+    waiting = sum(int(value) for key, value in diagnostics.items()
+                  if key.startswith(kind + ': waiting') or key == kind + ': held back')
+    came = diagnostics.get(kind + ': received', diagnostics.get(kind + ': messages'))
+    return came == str(received) and int(diagnostics[kind + ': together']) + waiting == received
 
 
 class Feeder:

@@ -1,14 +1,13 @@
 #!/usr/bin/python3
 """Whatever drivers send and users set: the manager lives, the user is told, and the estimate goes on as if nothing were."""
 
+import collections
 import copy
 import math
-import subprocess
 import unittest
 import xmlrpc.client
 
 import numpy as np
-import roslib.packages
 import rosgraph
 import rospy
 
@@ -18,6 +17,7 @@ import simulated_bag
 
 NAN, INF = float('nan'), float('inf')
 MANAGER = '/manager'
+MANY_BEAMS = 100000
 
 
 def changed(message, **fields):
@@ -50,7 +50,24 @@ def bad_scans(good):
         ('NaN for the first angle', changed(good, angle_min=NAN)),
         ('ranges turned round', changed(good, range_min=10.0, range_max=0.1)),
         ('NaN for the range limits', changed(good, range_min=NAN, range_max=NAN)),
+        ('angles turned round', changed(good, angle_increment=-good.angle_increment)),
     ]
+
+
+# What is said of a scan that the pipeline cannot use: the value, and what is expected.
+REASONS = {
+    'nothing but NaN': '0 of 360 ranges are finite and within [0.05, 30) m: expected at least 20',
+    'nothing but infinity': '0 of 360 ranges',
+    'nothing but zero': '0 of 360 ranges',
+    'nothing but the largest range': '0 of 360 ranges',
+    'no beam': '0 of 0 ranges',
+    'one beam': '1 of 1 ranges',
+    'no angle between the beams': 'angle_increment 0 with 360 ranges: expected values in rad, an increment that is not zero',
+    'NaN between the beams': 'angle_increment nan with 360 ranges: expected',
+    'NaN for the first angle': 'angle_min is nan, angle_increment',
+    'ranges turned round': 'range_min is 10, range_max 0.1: expected range_min below range_max [m]',
+    'NaN for the range limits': 'range_min is nan, range_max nan: expected range_min below range_max [m]',
+}
 
 
 def bad_odometry(good):
@@ -78,12 +95,26 @@ def odd_but_good(topic, good):
     return [good, changed(good, time_increment=-1.0, scan_time=NAN, angle_max=NAN)]
 
 
+def varied(scan, i):
+    """The same scan as other drivers send it: the other way round, with intensities, with far more beams, or as it is."""
+    if i == 60:
+        n = MANY_BEAMS // len(scan.ranges)
+        return changed(scan, ranges=list(np.repeat(scan.ranges, n)), angle_increment=scan.angle_increment / n,
+                       angle_min=scan.angle_min - 0.5 * scan.angle_increment * (1 - 1 / n))
+    if i % 3 == 1:
+        last = scan.angle_min + (len(scan.ranges) - 1) * scan.angle_increment
+        return changed(scan, ranges=list(reversed(scan.ranges)), angle_min=last, angle_max=scan.angle_min,
+                       angle_increment=-scan.angle_increment)
+    return changed(scan, intensities=[47.0] * len(scan.ranges)) if i % 3 == 2 else scan
+
+
 def with_bad_messages(messages):
-    """The messages, each followed by a bad one or an odd duplicate in turn; and how many bad scans there are of each kind."""
-    out, kinds = [], {}
+    """The messages, each followed by a bad one or an odd duplicate in turn; how many bad ones there are of each kind;
+    and of which kind the one of a stamp is."""
+    out, kinds, stamps = [], {}, {}
     count = {'/scan': 0, '/odom': 0, '/tf_static': 0}
     for topic, message, stamp in messages:
-        out.append((topic, message, stamp))
+        out.append((topic, varied(message, count[topic]) if topic == '/scan' else message, stamp))
         if topic == '/tf_static':
             continue
         shift = rospy.Duration(0, 1000 * 1000)  # a stamp of its own, a little later
@@ -93,13 +124,9 @@ def with_bad_messages(messages):
         kind, extra = bad[count[topic] % len(bad)]
         count[topic] += 1
         kinds[topic, kind] = kinds.get((topic, kind), 0) + 1
+        stamps[topic, extra.header.stamp.to_nsec()] = kind
         out.append((topic, extra, stamp))
-    return out, kinds
-
-
-def load_nodelet(name):
-    tool = roslib.packages.find_node('nodelet', 'nodelet')[0]
-    return subprocess.Popen([tool, 'load', 'sckf_odometry/ScKfOdometryNodelet', MANAGER, '__name:=' + name])
+    return out, kinds, stamps
 
 
 def manager_pid():
@@ -114,16 +141,17 @@ class BadInput(unittest.TestCase):
         helpers.wait_until(lambda: rosgraph.Master(rospy.get_name()).lookupNode(MANAGER), 'the manager')
         cls.pid = manager_pid()
         cls.recorder = helpers.Recorder()
-        rospy.set_param('/refused', {'gate_probability': 2.0, 'kf_dist_linear': 'far', 'publish_tf': 1, 'odom_frame': ''})
-        rospy.set_param('/sckf_odometry', {'kf_dist_linaer': 0.3, 'kf_dist_linear': 1, 'max_scan_delay': 10000})
-        cls.loaders = [load_nodelet('refused')]
+        cls.loaders = [helpers.load_nodelet(MANAGER, '/refused', gate_probability=2.0, kf_dist_linear='far',
+                                            publish_tf=1, odom_frame='')]
         helpers.wait_until(lambda: cls.recorder.log('not started'), 'the refusal of bad parameters')
-        cls.loaders.append(load_nodelet('sckf_odometry'))
+        cls.loaders.append(helpers.load_nodelet(
+            MANAGER, '/sckf_odometry', kf_dist_linaer=0.3, kf_dist_linear=1, max_scan_delay=10000,
+            prefer_twist_covariance=True, fixed_frame='odom', base_link_frame='unknown', base_frame='base_link'))
         helpers.wait_for_subscriber('/scan')
         good = simulated_bag.messages(duration=40.0)
-        messages, cls.kinds = with_bad_messages(good)
+        messages, cls.kinds, cls.kind_at = with_bad_messages(good)
         cls.scans = [message.header.stamp.to_sec() for topic, message, _ in good if topic == '/scan']
-        cls.sent = len([topic for topic, _, _ in messages if topic == '/scan'])
+        cls.sent = collections.Counter(topic for topic, _, _ in messages)
         early = [m for m in messages if m[0] != '/tf_static' and m[2] < simulated_bag.START + 3.0]
         late = [m for m in messages if m[0] != '/tf_static' and m[2] >= simulated_bag.START + 3.0]
         mount = [m for m in messages if m[0] == '/tf_static']
@@ -145,13 +173,18 @@ class BadInput(unittest.TestCase):
     def test_every_bad_parameter_is_named_with_what_is_allowed(self):
         text = self.recorder.log('not started')[0]
         for part in ('gate_probability = 2: a number in (0, 1) expected',
-                     'kf_dist_linear = "far": a number of at least 0 m expected',
+                     'kf_dist_linear = "far": a number in [0, 1000] m expected',
                      'publish_tf = 1: true or false expected',
                      'odom_frame = "": a text that is not empty expected'):
             self.assertIn(part, text)
 
-    def test_a_misspelt_parameter_is_named(self):
-        self.assertEqual(len(self.recorder.log('unknown parameter /sckf_odometry/kf_dist_linaer')), 1)
+    def test_a_misspelt_parameter_is_named_with_the_one_that_is_near(self):
+        self.assertEqual(self.recorder.log('unknown parameter'),
+                         ['/sckf_odometry: unknown parameter kf_dist_linaer: no effect; is kf_dist_linear meant?'])
+
+    def test_names_of_other_packages_are_taken_with_a_warning(self):
+        self.assertTrue(self.recorder.log('parameter fixed_frame = "odom": it is called odom_frame here'))
+        self.assertTrue(self.recorder.log('it is called base_frame here, and is set to "base_link", which holds'))
 
     def test_the_estimate_goes_on(self):
         stamps, poses = self.recorder.trajectory('pose')
@@ -167,23 +200,53 @@ class BadInput(unittest.TestCase):
         missing = [s for s in self.scans[:-1] if np.abs(stamps - s).min() > 1e-6]
         self.assertEqual(missing, [])
 
-    def test_every_scan_is_accounted_for(self):
-        def accounted():
-            counts = self.recorder.diagnostics()
-            return int(counts.get('scans: together', 0)) + int(counts.get('scans: waiting for their mount', 0)) == self.sent
-        helpers.wait_until(accounted, 'diagnostics that account for %d scans' % self.sent)
+    def test_every_message_is_accounted_for(self):
+        helpers.wait_until(lambda: helpers.accounted(self.recorder.diagnostics(), 'scans', self.sent['/scan']) and
+                           helpers.accounted(self.recorder.diagnostics(), 'odometry', self.sent['/odom']),
+                           'diagnostics that account for %s' % self.sent)
         counts = self.recorder.diagnostics()
-        of_kind = lambda kind: self.kinds['/scan', kind]
-        self.assertEqual(int(counts['scans: refused']), of_kind('no stamp') + of_kind('no frame'))
-        self.assertEqual(int(counts['scans: waiting for their mount']), of_kind('a frame that nobody knows'))
-        self.assertEqual(int(counts['scans: out of order']), of_kind('odd'))
-        self.assertGreaterEqual(int(counts['odometry: refused']), 30)
+        scans, odometry = (lambda kind, topic=topic: self.kinds[topic, kind] for topic in ('/scan', '/odom'))
+        for key, expected in {
+                'scans: refused, no stamp': scans('no stamp'),
+                'scans: refused, no frame': scans('no frame'),
+                'scans: refused, angles turned round': scans('angles turned round'),
+                'scans: waiting for their mount': scans('a frame that nobody knows'),
+                'scans: out of order': scans('odd'),
+                'scans: unusable': sum(scans(kind) for kind in REASONS),
+                'odometry: refused, no stamp': odometry('no stamp'),
+                'odometry: refused, other frame': odometry('the pose of a frame that nobody knows'),
+                'odometry: refused, wrong stamp': odometry('a stamp of long ago') + odometry('a stamp far ahead'),
+                'odometry: refused, duplicate': odometry('odd'),
+                'odometry: refused, no pose': sum(odometry(kind) for kind in (
+                    'NaN position', 'infinite position', 'no quaternion', 'a quaternion of length 2',
+                    'NaN in the quaternion')),
+        }.items():
+            self.assertEqual(int(counts.get(key, 0)), expected, key)
+
+    def test_the_status_names_value_and_expectation(self):
+        seen = set()
+        for status in self.recorder.messages('status'):
+            kind = self.kind_at.get(('/scan', status.header.stamp.to_nsec()))
+            if kind in REASONS:
+                self.assertEqual(status.outcome, 'unusable', kind)
+                self.assertIn(REASONS[kind], status.reason)
+                seen.add(kind)
+        self.assertEqual(seen, set(REASONS))
 
     def test_it_says_which_mount_it_waits_for(self):
         self.assertIn('no transform base_link -> laser on TF', self.recorder.log('waiting for the mount')[0])
 
-    def test_what_is_wrong_is_said(self):
-        for part in ('scan on /scan not used', 'odometry on /odom not used', 'expected'):
+    def test_what_is_wrong_is_said_with_topic_value_and_expectation(self):
+        for part in ('scan on /scan not used: header.stamp is 0: the time of the first beam expected',
+                     'scan on /scan not used: header.frame_id is empty: the laser\'s frame expected',
+                     'scan on /scan not used: angle_min is -3.14159, angle_max 3.12414, angle_increment -0.0174533: an',
+                     'scan on /scan not used: unusable: ',
+                     'scan on /scan not used: out of order: not newer than the estimate',
+                     'odometry on /odom not used: header.stamp is 0: the time of the reading expected',
+                     'odometry on /odom held back: header.stamp is ',
+                     'odometry on /odom not used: position (nan, ',
+                     'odometry on /odom not used: child_frame_id is "nowhere", ~base_frame "base_link" expected',
+                     'odometry on /odom: twist.covariance of x, y, yaw [-1, -1, -1; -1, -1, -1; -1, -1, -1]: finite, symmetric'):
             self.assertTrue(self.recorder.log(part), part)
 
 

@@ -184,5 +184,115 @@ TEST(Conversions, AnUpsideDownMountKeepsItsThirdDimension) {
   EXPECT_LT((base_from_laser * Eigen::Vector3d(1.0, 2.0, 0.0) - Eigen::Vector3d(1.2, -2.0, 0.4)).norm(), 1e-12);
 }
 
+TEST(Conversions, AScanWhoseLastAngleIsOnTheWrongSideIsTurnedRound) {
+  sensor_msgs::LaserScan scan;
+  scan.angle_min = -1.0F;
+  scan.angle_max = 1.0F;
+  scan.angle_increment = 0.1F;
+  EXPECT_FALSE(isTurnedRound(scan));
+  scan.angle_increment = -0.1F;
+  EXPECT_TRUE(isTurnedRound(scan));
+  std::swap(scan.angle_min, scan.angle_max);
+  EXPECT_FALSE(isTurnedRound(scan));
+  scan.angle_max = std::numeric_limits<float>::quiet_NaN();  // a driver that does not fill it in
+  EXPECT_FALSE(isTurnedRound(scan));
+  scan.angle_min = scan.angle_max = 0.0F;  // one beam
+  EXPECT_FALSE(isTurnedRound(scan));
+}
+
+geometry_msgs::PoseWithCovarianceStamped somePose() {
+  geometry_msgs::PoseWithCovarianceStamped message;
+  message.header.frame_id = "/odom";
+  message.header.stamp = ros::Time(5.0);
+  message.pose.pose.position.x = 1.0;
+  message.pose.pose.orientation.z = message.pose.pose.orientation.w = std::sqrt(0.5);
+  return message;
+}
+
+std::string refusalOf(const geometry_msgs::PoseWithCovarianceStamped& message) {
+  std::string problem;
+  return toGivenPose(message, "odom", &problem) ? "taken" : problem;
+}
+
+TEST(Conversions, AGivenPoseIsTakenWithItsCovariance) {
+  auto message = somePose();
+  EXPECT_TRUE(toGivenPose(message, "odom", nullptr)->covariance.isZero());  // exact
+  message.pose.covariance[0] = 0.25;                                        // what rviz sends
+  message.pose.covariance[7] = 0.25;
+  message.pose.covariance[35] = 0.07;
+  const auto pose = toGivenPose(message, "odom", nullptr);
+  ASSERT_TRUE(pose);
+  EXPECT_NEAR(error(pose->odom_from_base, SE2(1.0, 0.0, M_PI / 2)).norm(), 0.0, 1e-9);
+  EXPECT_EQ(pose->covariance.diagonal(), Eigen::Vector3d(0.25, 0.25, 0.07));
+  EXPECT_EQ(pose->stamp, std::chrono::seconds(5));
+}
+
+TEST(Conversions, AGivenPoseThatIsNoneIsRefusedByValueAndExpectation) {
+  auto message = somePose();
+  message.header.frame_id = "map";
+  EXPECT_EQ(refusalOf(message), "header.frame_id is \"map\": \"odom\" expected");
+  message = somePose();
+  message.pose.pose.orientation.w = 0.0;
+  EXPECT_TRUE(contains(refusalOf(message), "a quaternion of length 1 expected"));
+  message = somePose();
+  message.pose.pose.position.y = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(contains(refusalOf(message), "position (1, nan): finite numbers expected"));
+  message = somePose();
+  message.pose.covariance[7] = -1.0;
+  EXPECT_TRUE(contains(refusalOf(message), "[0, 0, 0; 0, -1, 0; 0, 0, 0]: finite, symmetric and without negative"));
+  message = somePose();
+  message.pose.covariance[0] = message.pose.covariance[7] = 1.0;
+  message.pose.covariance[1] = 0.5;
+  EXPECT_TRUE(contains(refusalOf(message), "symmetric"));
+  message = somePose();
+  message.pose.covariance[35] = std::numeric_limits<double>::infinity();
+  EXPECT_TRUE(contains(refusalOf(message), "finite"));
+}
+
+TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
+  ScanReport report;
+  report.stamp = std::chrono::seconds(7);
+  report.outcome = ScanOutcome::kSlip;
+  report.match.pairs.resize(30);
+  report.match.overlap = 0.8;
+  report.match.residual_rms = 1.1;
+  report.innovation = Innovation();
+  report.innovation->residual = Eigen::Vector2d(1.0, 2.0);
+  report.innovation->covariance = Eigen::Matrix2d::Identity();
+  report.nis_bound = 13.8;
+  report.reference_stamp = std::chrono::seconds(4);
+  report.match_time = 0.001;
+  report.total_time = 0.002;
+  const auto status = toStatus(report, "sckf", "odom", ros::Time(7.5));
+  EXPECT_EQ(status.header.stamp, ros::Time(7.0));
+  EXPECT_EQ(status.header.frame_id, "odom");
+  EXPECT_EQ(status.method, "sckf");
+  EXPECT_EQ(status.outcome, "slip");
+  EXPECT_TRUE(status.accepted);
+  EXPECT_TRUE(status.wheels_known);
+  EXPECT_EQ(status.pairs, 30u);
+  EXPECT_EQ(status.overlap, 0.8);
+  EXPECT_EQ(status.residual_rms, 1.1);
+  EXPECT_EQ(status.dimension, 2);
+  EXPECT_NEAR(status.nis, 5.0, 1e-12);
+  EXPECT_EQ(status.nis_bound, 13.8);
+  EXPECT_EQ(status.reference_age, 3.0);
+  EXPECT_EQ(status.match_time, 0.001);
+  EXPECT_EQ(status.total_time, 0.002);
+  EXPECT_NEAR(status.latency, 0.5, 1e-9);
+}
+
+TEST(Conversions, TheStatusOfAScanThatWasNotUsedHasNoNumbers) {
+  ScanReport report;
+  report.outcome = ScanOutcome::kGated;
+  report.reason = "why";
+  const auto status = toStatus(report, "sckf", "odom", ros::Time());
+  EXPECT_FALSE(status.accepted);
+  EXPECT_EQ(status.reason, "why");
+  EXPECT_EQ(status.dimension, 0);
+  EXPECT_EQ(status.nis, 0.0);
+  EXPECT_EQ(status.reference_age, 0.0);
+}
+
 }  // namespace
 }  // namespace sckf

@@ -26,9 +26,9 @@ class TemporaryFile {
   std::string path_;
 };
 
-Options read(const std::string& yaml, std::vector<std::string>* unknown = nullptr) {
+Options read(const std::string& yaml, std::vector<std::string>* warnings = nullptr) {
   const TemporaryFile file(yaml);
-  return readOptions(ParameterFile(file.path()), unknown);
+  return readOptions(ParameterFile(file.path()), warnings);
 }
 
 std::string refusal(const std::string& yaml) {
@@ -75,9 +75,9 @@ TEST(Parameters, TheConfiguredFileNamesEveryParameterWithItsDefault) {
   for (const Parameter& parameter : parameterList(defaults)) {
     EXPECT_EQ(file.values().count(parameter.name), 1u) << parameter.name << " is not in " << kConfigFile;
   }
-  std::vector<std::string> unknown;
-  Options configured = readOptions(file, &unknown);
-  EXPECT_TRUE(unknown.empty());
+  std::vector<std::string> warnings;
+  Options configured = readOptions(file, &warnings);
+  EXPECT_TRUE(warnings.empty());
   const auto got = parameterList(configured);
   const auto expected = parameterList(defaults);
   for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_EQ(valueOf(got[i]), valueOf(expected[i])) << got[i].name;
@@ -116,7 +116,7 @@ TEST(Parameters, LeadingSlashesOfFramesAreDropped) {
 TEST(Parameters, ABadValueIsRefusedByNameValueAndAllowedRange) {
   EXPECT_TRUE(contains(refusal("gate_probability: 1.5\n"), "gate_probability = 1.5: a number in (0, 1) expected"));
   EXPECT_TRUE(contains(refusal("gate_probability: .nan\n"), "gate_probability = .nan: a number in (0, 1)"));
-  EXPECT_TRUE(contains(refusal("kf_dist_linear: -0.1\n"), "kf_dist_linear = -0.1: a number of at least 0 m"));
+  EXPECT_TRUE(contains(refusal("kf_dist_linear: -0.1\n"), "kf_dist_linear = -0.1: a number in [0, 1000] m"));
   EXPECT_TRUE(contains(refusal("kf_dist_linear: .inf\n"), "kf_dist_linear = .inf"));
   EXPECT_TRUE(contains(refusal("kf_dist_linear: far\n"), "kf_dist_linear = \"far\": a number"));
   EXPECT_TRUE(contains(refusal("kf_dist_linear: [1, 2]\n"), "kf_dist_linear = [1, 2]: a number"));
@@ -127,6 +127,10 @@ TEST(Parameters, ABadValueIsRefusedByNameValueAndAllowedRange) {
   EXPECT_TRUE(contains(refusal("publish_tf: 'true'\n"), "publish_tf = \"true\": true or false expected"));
   EXPECT_TRUE(contains(refusal("odom_frame: ''\n"), "odom_frame = \"\": a text that is not empty expected"));
   EXPECT_TRUE(contains(refusal("odom_frame: 3\n"), "odom_frame = 3: a text"));
+  EXPECT_TRUE(contains(refusal("state_file: 3\n"), "state_file = 3: a text expected"));
+  EXPECT_TRUE(contains(refusal("path_distance: -1\n"), "path_distance = -1: a number of at least 0 m"));
+  EXPECT_TRUE(contains(refusal("time_jump: 0\n"), "time_jump = 0: a number above 0 s"));
+  EXPECT_TRUE(contains(refusal("queue_size: -1\n"), "queue_size = -1: a whole number in [1, 1e+06] messages"));
   EXPECT_TRUE(contains(refusal("method: icp\n"), "method = \"icp\": one of \"sckf\""));
 }
 
@@ -145,10 +149,66 @@ TEST(Parameters, ValuesThatContradictEachOtherAreRefused) {
 }
 
 TEST(Parameters, UnknownNamesAreToldAndChangeNothing) {
-  std::vector<std::string> unknown;
-  const Options options = read("kf_dist_linaer: 3.0\nscan:\n  range: 1.0\n", &unknown);
-  EXPECT_EQ(unknown, (std::vector<std::string>{"kf_dist_linaer", "scan/range"}));
+  std::vector<std::string> warnings;
+  const Options options = read("kf_dist_linaer: 3.0\nscan:\n  publisher: 1.0\n", &warnings);
+  EXPECT_EQ(warnings, (std::vector<std::string>{
+                          "unknown parameter kf_dist_linaer: no effect; is kf_dist_linear meant?",
+                          "unknown parameter scan/publisher: no effect; the names are in config/sckf_odometry.yaml"}));
   EXPECT_EQ(options.pipeline.reference.kf_dist_linear, ReferenceOptions().kf_dist_linear);
+}
+
+TEST(Parameters, AMisspeltNameIsNearToWhatWasMeant) {
+  for (const auto& [misspelt, meant] : std::map<std::string, std::string>{{"publsih_tf", "publish_tf"},
+                                                                          {"Method", "method"},
+                                                                          {"odometry_time_out", "odometry_timeout"},
+                                                                          {"tf_odometry_fram", "tf_odometry_frame"}}) {
+    std::vector<std::string> warnings;
+    read(misspelt + ": 1\n", &warnings);
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_TRUE(contains(warnings[0], "is " + meant + " meant?"));
+  }
+}
+
+TEST(Parameters, NamesOfOtherPackagesAreTakenWithAWarning) {
+  std::vector<std::string> warnings;
+  Options options = read("fixed_frame: world\nbase_link_frame: /base_footprint\n", &warnings);
+  EXPECT_EQ(options.node.odom_frame, "world");
+  EXPECT_EQ(options.node.base_frame, "base_footprint");
+  EXPECT_EQ(warnings,
+            (std::vector<std::string>{"parameter base_link_frame = \"/base_footprint\": it is called base_frame here",
+                                      "parameter fixed_frame = \"world\": it is called odom_frame here"}));
+}
+
+TEST(Parameters, WhereBothNamesAreGivenOursHolds) {
+  std::vector<std::string> warnings;
+  const Options options = read("fixed_frame: world\nodom_frame: odom2\n", &warnings);
+  EXPECT_EQ(options.node.odom_frame, "odom2");
+  EXPECT_EQ(warnings,
+            (std::vector<std::string>{"parameter fixed_frame = \"world\": it is called odom_frame here, and is "
+                                      "set to \"odom2\", which holds"}));
+}
+
+TEST(Parameters, ABadValueByAnotherPackagesNameIsRefused) {
+  EXPECT_TRUE(contains(refusal("fixed_frame: 3\n"), "odom_frame = 3: a text"));
+}
+
+TEST(Parameters, EveryAliasLeadsToAParameterAndIsNone) {
+  Options options;
+  std::map<std::string, int> known;
+  for (const Parameter& parameter : parameterList(options)) ++known[parameter.name];
+  for (const auto& [alias, name] : parameterAliases()) {
+    EXPECT_EQ(known.count(name), 1u) << name;
+    EXPECT_EQ(known.count(alias), 0u) << alias;
+  }
+}
+
+TEST(Parameters, WhatIsNotGivenStaysAsItWas) {
+  const TemporaryFile file("kf_dist_linear: 2\n");
+  Options before;
+  before.node.odom_frame = "sckf_odom";
+  const Options after = readOptions(ParameterFile(file.path()), nullptr, before);
+  EXPECT_EQ(after.node.odom_frame, "sckf_odom");
+  EXPECT_EQ(after.pipeline.reference.kf_dist_linear, 2.0);
 }
 
 TEST(Parameters, AFileThatCannotBeReadIsNamed) {

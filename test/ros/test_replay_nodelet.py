@@ -93,7 +93,10 @@ class ReplayNodelet(unittest.TestCase):
 
     def test_it_is_published_at_the_rate_of_the_odometry(self):
         stamps, _ = self.recorder.trajectory('odometry/filtered')
-        missing = [s for s in np.unique(self.wheels[0]) if np.abs(stamps - s).min() > 1e-6]
+        wheels = np.unique(self.wheels[0])
+        # The first one after a silence is used with the next one, as its stamp may be wrong.
+        after_silence = wheels[1:][np.diff(wheels) > rospy.get_param('/sckf_odometry/odometry_timeout')]
+        missing = [s for s in wheels if np.abs(stamps - s).min() > 1e-6 and s not in after_silence]
         # Before the first scan there need be no estimate.
         self.assertEqual([s for s in missing if s > self.scans[1]], [])
 

@@ -73,6 +73,7 @@ struct ScanReport {
   Match match;                               ///< of a scan that was compared with a reference
   DisplacementPrediction prediction;         ///< what the filter expected
   std::optional<Innovation> innovation;      ///< where there is a displacement
+  double nis_bound = 0.0;                    ///< what contradicts the prediction has a larger nis()
   Stamp reference_stamp{0};                  ///< of the scan that it was compared with
   bool new_reference = false;                ///< it became the reference
   bool wheels_known = true;                  ///< false: wheels did not tell all of the motion since the scan before

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "sckf_odometry/Status.h"
 #include "sckf_odometry/pipeline/scan_odometry.h"
 
 namespace sckf {
@@ -27,6 +28,10 @@ std::string frameName(const std::string& frame);
 /// angle_min + i · angle_increment by the definition of the message, while drivers disagree about whether angle_max is
 /// the last beam or the one after it, and round it.
 LaserScan toScan(const sensor_msgs::LaserScan& message);
+
+/// Whether angle_max lies on the other side of angle_min than angle_increment goes: then one of them has the wrong
+/// sign, and the scan may be its mirror image.
+bool isTurnedRound(const sensor_msgs::LaserScan& message);
 
 /// x, y and yaw of a pose. Empty, with the problem in words, if a number is not finite or the quaternion is not of unit
 /// length: a driver that never filled it in.
@@ -43,6 +48,21 @@ std::optional<OdometrySample> toOdometrySample(const nav_msgs::Odometry& message
 /// covariance with it.
 OdometrySample moved(const OdometrySample& sample, const SE2& child_from_base);
 
+/// What is wrong with a covariance of six axes in the plane, in words: value and what is expected; empty if nothing is.
+/// Zero is allowed.
+std::string covarianceProblem(const boost::array<double, 36>& covariance);
+
+/// Where somebody says that the robot is, or was.
+struct GivenPose {
+  SE2 odom_from_base;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of the additive error in x, y, yaw; zero: exact
+  Stamp stamp{0};                                        ///< zero: now
+};
+
+/// Empty, with the problem in words, if the pose is in another frame or is none, or the covariance is none.
+std::optional<GivenPose> toGivenPose(const geometry_msgs::PoseWithCovarianceStamped& message,
+                                     const std::string& odom_frame, std::string* problem);
+
 /// The robot lives in the plane: z, roll, pitch and their rates are zero, and known, so that their variances are this
 /// small value [m², rad², and per s²] and not zero, which other packages cannot invert, nor large, which rviz draws.
 constexpr double kVarianceOutOfPlane = 1e-6;
@@ -56,6 +76,10 @@ geometry_msgs::PoseStamped toPoseStamped(const SE2& pose, Stamp stamp, const std
 /// Points in the plane of the frame.
 sensor_msgs::PointCloud2 toPointCloud(const std::vector<Eigen::Vector2d>& points, Stamp stamp,
                                       const std::string& frame);
+
+/// now: ROS time.
+sckf_odometry::Status toStatus(const ScanReport& report, const std::string& method, const std::string& odom_frame,
+                               const ros::Time& now);
 
 /// The transform that takes coordinates in child_frame to coordinates in frame.
 geometry_msgs::TransformStamped toTransform(const SE2& frame_from_child, Stamp stamp, const std::string& frame,

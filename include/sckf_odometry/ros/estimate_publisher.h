@@ -29,7 +29,10 @@ class EstimatePublisher {
   /// path, path_odometry and cloud, if there is anything new.
   void publishViews();
 
-  /// A new estimate begins, at whatever time.
+  /// A new estimate begins, at the same time: what is drawn begins anew, and still no stamp comes twice.
+  void clearViews();
+
+  /// A new estimate begins, and a new time.
   void restart();
 
  private:

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <map>
 #include <string>
 #include <variant>
 #include <vector>
@@ -21,6 +22,9 @@ struct NodeOptions {
   std::string tf_odometry_frame = "odom";  ///< frame of the wheel odometry on TF
   std::size_t queue_size = 2000;           ///< messages per subscription that may wait
   double time_jump = 1.0;                  ///< [s] odometry that goes back by more starts a new estimate
+  double scan_timeout = 2.0;               ///< [s] no scan for longer is worth a warning
+  std::string state_file;                  ///< where the last pose is kept for a restart of the node; empty: nowhere
+  double state_max_age = 60.0;             ///< [s] an older pose is not taken up
   double visualization_rate = 2.0;         ///< [1/s] of wall time, at which paths and cloud are published
   double path_distance = 0.05;             ///< [m] between two poses of a path
   std::size_t path_max_poses = 10000;      ///< a path that grows longer is thinned to half
@@ -52,14 +56,20 @@ struct Parameter {
   Field field;
   Range range;                       ///< of a number
   std::string unit;                  ///< of a number, empty if it has none
-  std::vector<std::string> choices;  ///< of a text; empty: any but the empty text
+  std::vector<std::string> choices;  ///< of a text; empty: any
+  bool may_be_empty = false;         ///< a text
+  bool at_run_time = false;          ///< it can be changed while the node runs: it is in cfg/ScKfOdometry.cfg too
 };
 
 /// Every parameter of the package, its field in the options given.
 std::vector<Parameter> parameterList(Options& options);
 
-/// The defaults, with what the source sets. Names that are not in the list go to `unknown`, where that is not null.
+/// Names that other packages have for a parameter, and its name here.
+const std::map<std::string, std::string>& parameterAliases();
+
+/// The options given, with what the source sets. What it says to no effect, or by another package's name, goes to
+/// `warnings`, where that is not null, a line for each.
 /// Throws std::invalid_argument with one line for each bad value: parameter, value, what is allowed.
-Options readOptions(const ParameterSource& source, std::vector<std::string>* unknown = nullptr);
+Options readOptions(const ParameterSource& source, std::vector<std::string>* warnings = nullptr, Options options = {});
 
 }  // namespace sckf

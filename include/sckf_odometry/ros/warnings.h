@@ -15,14 +15,22 @@ class Warnings {
   explicit Warnings(double period = 5.0) : period_(period) {}
 
   void warn(const std::string& kind, const std::string& text) {
-    const ros::SteadyTime now = ros::SteadyTime::now();
-    const auto last = last_.find(kind);
-    if (last != last_.end() && (now - last->second).toSec() < period_) return;
-    last_[kind] = now;
-    ROS_WARN_STREAM_NAMED("sckf_odometry", text);
+    if (isDue(kind)) ROS_WARN_STREAM_NAMED("sckf_odometry", text);
+  }
+
+  void error(const std::string& kind, const std::string& text) {
+    if (isDue(kind)) ROS_ERROR_STREAM_NAMED("sckf_odometry", text);
   }
 
  private:
+  bool isDue(const std::string& kind) {
+    const ros::SteadyTime now = ros::SteadyTime::now();
+    const auto last = last_.find(kind);
+    if (last != last_.end() && (now - last->second).toSec() < period_) return false;
+    last_[kind] = now;
+    return true;
+  }
+
   double period_;  // [s]
   std::map<std::string, ros::SteadyTime> last_;
 };

@@ -1,0 +1,158 @@
+#include "sckf_odometry/ros/health.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <sstream>
+
+namespace sckf {
+
+namespace {
+
+using Status = diagnostic_msgs::DiagnosticStatus;
+using StatusWrapper = diagnostic_updater::DiagnosticStatusWrapper;
+
+/// A row of so many scans that did not correct the estimate is worth a warning.
+constexpr std::size_t kManyUnused = 10;
+
+void addEnds(const std::string& kind, const MessageTally& tally, StatusWrapper& status) {
+  for (const auto& [how, count] : tally.ends()) status.add(kind + ": " + how, count);
+  std::size_t refused = 0;
+  for (const auto& [how, count] : tally.ends()) refused += how.rfind("refused", 0) == 0 ? count : 0;
+  status.add(kind + ": refused", refused);
+  status.add(kind + ": together", tally.together());
+}
+
+void addRecent(const std::string& kind, const MessageTally::Recent& recent, StatusWrapper& status) {
+  status.addf(kind + ": rate [1/s]", "%.1f", recent.rate);
+  if (!recent.latency) return;
+  status.addf(kind + ": latency, mean [s]", "%.3f", *recent.latency);
+  status.addf(kind + ": latency, longest [s]", "%.3f", *recent.latency_max);
+}
+
+std::string silenceOf(const std::string& what, double silence, const std::string& parameter, double timeout) {
+  std::ostringstream text;
+  text.precision(3);
+  text << "no " << what << " for " << silence << " s (~" << parameter << ": " << timeout << " s)";
+  return text.str();
+}
+
+}  // namespace
+
+void Health::scanTaken(const ScanReport& report) {
+  if (scans_in_pipeline_ > 0) --scans_in_pipeline_;
+  const bool is_failed_match = report.outcome == ScanOutcome::kNoMatch;
+  scans.ended(toString(report.outcome) + (is_failed_match ? ", " + toString(report.match.failure) : ""));
+  last_scan_ = toString(report.outcome) + (report.reason.empty() ? "" : ": " + report.reason);
+  slips_now_ = report.outcome == ScanOutcome::kSlip;
+  if (slips_now_) ++slips_;
+  unused_in_a_row_ = report.reason.empty() ? 0 : unused_in_a_row_ + 1;
+  if (report.innovation) {
+    last_dimension_ = report.innovation->residual.size();
+    last_nis_ = report.innovation->nis();
+  }
+  if (!report.estimate) return;
+  last_stamp_ = report.stamp;
+  if (report.new_reference) reference_stamp_ = report.stamp;
+  ++timed_;
+  time_ += report.total_time;
+  time_max_ = std::max(time_max_, report.total_time);
+}
+
+void Health::pipelineDropped(const std::string& how, std::size_t odometry_jumps) {
+  scans.ended(how, scans_in_pipeline_);
+  scans_in_pipeline_ = 0;
+  reference_stamp_ = last_stamp_ = Stamp(0);
+  odometry_jumps_before_ += odometry_jumps;
+  unused_in_a_row_ = 0;
+  slips_now_ = false;
+}
+
+std::vector<Health::Finding> Health::report(const Conditions& conditions, const Options& options, const ros::Time& now,
+                                            StatusWrapper& status) {
+  std::vector<Finding> findings = this->findings(conditions, options, now);
+  status.summary(Status::OK, "");
+  for (const Finding& finding : findings) {
+    status.summary(std::max(static_cast<unsigned char>(status.level), finding.level),
+                   status.message + (status.message.empty() ? "" : "; ") + finding.text);
+  }
+  if (findings.empty()) status.message = "estimating";
+  status.add("paused", conditions.paused);
+  addScans(conditions, now, status);
+  addOdometry(conditions, now, status);
+  addEstimate(conditions, status);
+  slips_reported_ = slips_;
+  odometry_jumps_reported_ = odometry_jumps_before_ + conditions.odometry_jumps;
+  return findings;
+}
+
+std::vector<Health::Finding> Health::findings(const Conditions& conditions, const Options& options,
+                                              const ros::Time& now) const {
+  std::vector<Finding> findings;
+  const auto warn = [&findings](const std::string& kind, const std::string& text) {
+    findings.push_back({Status::WARN, kind, text});
+  };
+  const double odometry_timeout = options.pipeline.odometry_timeout;
+  const double odometry_silence = odometry.silence(now).value_or(0.0);
+  if (odometry_silence > odometry_timeout) {
+    findings.push_back(
+        {Status::ERROR, "odometry timeout",
+         silenceOf("odometry on " + odometry_source_, odometry_silence, "odometry_timeout", odometry_timeout) +
+             (options.pipeline.scans_alone ? ": the scans carry on alone" : ": the estimate waits")});
+  }
+  if (conditions.paused) {
+    warn("paused", "paused");
+    return findings;
+  }
+  if (!conditions.waiting_for.empty()) warn("waiting", "waiting for " + conditions.waiting_for);
+  const double scan_timeout = options.node.scan_timeout;
+  const double scan_silence = scans.silence(now).value_or(0.0);
+  if (scan_silence > scan_timeout) {
+    warn("scan timeout", silenceOf("scans on " + scan_topic_, scan_silence, "scan_timeout", scan_timeout) +
+                             ": the wheels carry on alone");
+  }
+  if (unused_in_a_row_ >= kManyUnused) {
+    warn("scans unused", "the last " + std::to_string(unused_in_a_row_) +
+                             " scans did not correct the estimate; the last one: " + last_scan_);
+  }
+  if (odometry_jumps_before_ + conditions.odometry_jumps > odometry_jumps_reported_) {
+    warn("odometry jump", "the odometry on " + odometry_source_ + " jumped: not taken for motion");
+  }
+  if (slips_ > slips_reported_) warn("slip", "the wheels slip: the scans are believed");
+  return findings;
+}
+
+void Health::addScans(const Conditions& conditions, const ros::Time& now, StatusWrapper& status) {
+  status.add("scans: received", scans.received());
+  addEnds("scans", scans, status);
+  status.add("scans: waiting for odometry", scans_in_pipeline_);
+  status.add("scans: waiting for their mount", conditions.scans_without_mount);
+  status.add("scans: held back", conditions.scans_held_back);
+  addRecent("scans", scans.recent(now), status);
+  status.add("last scan", last_scan_);
+  if (timed_ == 0) return;
+  status.addf("time of a scan, mean [ms]", "%.3f", 1e3 * time_ / static_cast<double>(timed_));
+  status.addf("time of a scan, longest [ms]", "%.3f", 1e3 * time_max_);
+}
+
+void Health::addOdometry(const Conditions& conditions, const ros::Time& now, StatusWrapper& status) {
+  status.add("odometry: messages", odometry.received());
+  addEnds("odometry", odometry, status);
+  status.add("odometry: held back", conditions.odometry_held_back);
+  addRecent("odometry", odometry.recent(now), status);
+  status.add("odometry: jumps", odometry_jumps_before_ + conditions.odometry_jumps);
+  status.add("scans alone", conditions.scans_alone);
+  status.add("time jumps: back", jumps_back_);
+  status.add("time jumps: ahead", jumps_ahead_);
+}
+
+void Health::addEstimate(const Conditions& conditions, StatusWrapper& status) const {
+  status.add("wheels slip", slips_now_);
+  status.add("wheel slips", slips_);
+  status.addf("NIS", "%.3f", last_nis_);
+  status.add("observed dimension", last_dimension_);
+  if (reference_stamp_ == Stamp(0)) return;
+  status.addf("reference age [s]", "%.3f",
+              seconds(std::max(last_stamp_, conditions.newest_odometry) - reference_stamp_));
+}
+
+}  // namespace sckf

@@ -1,0 +1,117 @@
+#include "sckf_odometry/ros/input_gate.h"
+
+#include <algorithm>
+#include <optional>
+#include <sstream>
+
+#include "sckf_odometry/ros/conversions.h"
+
+namespace sckf {
+
+namespace {
+
+constexpr char kWrongStamp[] = "refused, wrong stamp";
+
+Stamp now() { return toStamp(ros::Time::now()); }
+
+std::string turnedRound(const sensor_msgs::LaserScan& scan) {
+  std::ostringstream text;
+  text << "angle_min is " << scan.angle_min << ", angle_max " << scan.angle_max << ", angle_increment "
+       << scan.angle_increment << ": an increment that leads from the first to the last expected";
+  return text.str();
+}
+
+}  // namespace
+
+InputGate::InputGate(const NodeOptions& options, const std::string& odometry_source, const std::string& scan_topic,
+                     Health& health, Warnings& warnings)
+    : odometry_source_(odometry_source),
+      scan_topic_(scan_topic),
+      health_(health),
+      warnings_(warnings),
+      odometry_stamps_(options.time_jump),
+      scan_stamps_(options.time_jump) {}
+
+InputGate::Scans InputGate::admit(const Scan& message) {
+  const std_msgs::Header& header = message->header;
+  health_.scans.came(header.stamp, ros::Time::now());
+  if (header.stamp.isZero()) {
+    refuseScan("no stamp", "header.stamp is 0: the time of the first beam expected");
+  } else if (header.frame_id.empty()) {
+    refuseScan("no frame", "header.frame_id is empty: the laser's frame expected");
+  } else if (isTurnedRound(*message)) {
+    refuseScan("angles turned round", turnedRound(*message));
+  } else {
+    const Stamp stamp = toStamp(header.stamp);
+    const Scans admission = scan_stamps_.admit(stamp, message, now(), odometry_stamps_.newest());
+    health_.scans.ended(kWrongStamp, admission.dropped);
+    if (admission.passed.empty()) warnOfHeldBack("scan on " + scan_topic_, stamp);
+    return admission;
+  }
+  return {};
+}
+
+InputGate::Samples InputGate::admit(const nav_msgs::Odometry& message, bool uses_twist_covariance, TfInput& tf) {
+  health_.odometry.came(message.header.stamp, ros::Time::now());
+  if (message.header.stamp.isZero()) {
+    refuseOdometry("no stamp", "header.stamp is 0: the time of the reading expected");
+    return {};
+  }
+  std::string problem;
+  std::optional<OdometrySample> sample = toOdometrySample(message, &problem);
+  if (!sample) {
+    refuseOdometry("no pose", problem);
+    return {};
+  }
+  sample = tf.inBaseFrame(*sample, frameName(message.child_frame_id), &problem);
+  if (!sample) {
+    refuseOdometry("other frame", problem);
+    return {};
+  }
+  problem = uses_twist_covariance ? covarianceProblem(message.twist.covariance) : "";
+  if (!problem.empty()) {
+    warnings_.warn("twist covariance", "odometry on " + odometry_source_ + ": twist." + problem +
+                                           "; the model of the wheels is used in its place");
+  }
+  return admitByStamp(*sample);
+}
+
+InputGate::Samples InputGate::admit(const OdometrySample& sample) {
+  health_.odometry.came(toTime(sample.stamp), ros::Time::now());
+  return admitByStamp(sample);
+}
+
+InputGate::Samples InputGate::admitByStamp(const OdometrySample& sample) {
+  const Samples admission = odometry_stamps_.admit(sample.stamp, sample, now());
+  health_.odometry.ended(kWrongStamp, admission.dropped);
+  if (admission.passed.empty()) warnOfHeldBack("odometry on " + odometry_source_, sample.stamp);
+  return admission;
+}
+
+void InputGate::refuseScan(const std::string& kind, const std::string& reason) {
+  health_.scans.ended("refused, " + kind);
+  warnings_.warn("scan " + kind, "scan on " + scan_topic_ + " not used: " + reason);
+}
+
+void InputGate::refuseOdometry(const std::string& kind, const std::string& reason) {
+  health_.odometry.ended("refused, " + kind);
+  warnings_.warn("odometry " + kind, "odometry on " + odometry_source_ + " not used: " + reason);
+}
+
+void InputGate::restart() {
+  if (odometry_stamps_.newest() > scan_stamps_.newest()) {
+    odometry_stamps_.restart();
+  } else {
+    scan_stamps_.restart();
+  }
+}
+
+void InputGate::warnOfHeldBack(const std::string& what, Stamp stamp) {
+  std::ostringstream text;
+  text << what << " held back: header.stamp is " << toTime(stamp) << ": one about that of the newest, "
+       << toTime(std::max(odometry_stamps_.newest(), scan_stamps_.newest()))
+       << ", expected; more that go on from it are a jump of time";
+  warnings_.warn(what + " held back", text.str());
+}
+
+}  // namespace sckf

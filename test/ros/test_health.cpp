@@ -1,0 +1,181 @@
+#include <gtest/gtest.h>
+
+#include "sckf_odometry/ros/health.h"
+#include "text_matchers.h"
+
+namespace sckf {
+namespace {
+
+using Level = diagnostic_msgs::DiagnosticStatus;
+
+ros::Time at(double time) { return ros::Time(time); }
+
+ScanReport scan(ScanOutcome outcome, double time, const std::string& reason = "") {
+  ScanReport report;
+  report.outcome = outcome;
+  report.stamp = Stamp(static_cast<Stamp::rep>(at(time).toNSec()));
+  report.reason = reason;
+  report.estimate = Estimate();
+  report.total_time = 0.002;
+  return report;
+}
+
+class HealthTest : public testing::Test {
+ protected:
+  HealthTest() {
+    health_.odometry.came(at(100.0), at(100.0));
+    health_.scans.came(at(100.0), at(100.0));
+  }
+
+  struct Verdict {
+    int level;
+    std::string text;
+  };
+
+  Verdict verdictAt(double time) {
+    status_.values.clear();
+    health_.report(conditions_, options_, at(time), status_);
+    return {status_.level, status_.message};
+  }
+
+  std::string value(const std::string& key) const {
+    for (const auto& entry : status_.values) {
+      if (entry.key == key) return entry.value;
+    }
+    return "missing";
+  }
+
+  Health health_{"/odom", "/scan"};
+  Health::Conditions conditions_;
+  Options options_;
+  diagnostic_updater::DiagnosticStatusWrapper status_;
+};
+
+TEST_F(HealthTest, AllIsWellWhileMessagesCome) { EXPECT_EQ(verdictAt(100.9).level, Level::OK); }
+
+TEST_F(HealthTest, WheelsThatAreSilentAreAnErrorThatSaysWhatHappens) {
+  Verdict verdict = verdictAt(101.5);
+  EXPECT_EQ(verdict.level, Level::ERROR);
+  EXPECT_EQ(verdict.text, "no odometry on /odom for 1.5 s (~odometry_timeout: 1 s): the estimate waits");
+  options_.pipeline.scans_alone = true;
+  EXPECT_TRUE(contains(verdictAt(101.5).text, "the scans carry on alone"));
+  health_.odometry.came(at(101.6), at(101.6));
+  EXPECT_EQ(verdictAt(101.7).level, Level::OK);
+}
+
+TEST_F(HealthTest, SilentScansAreAWarning) {
+  health_.odometry.came(at(103.0), at(103.0));
+  const Verdict verdict = verdictAt(103.0);
+  EXPECT_EQ(verdict.level, Level::WARN);
+  EXPECT_EQ(verdict.text, "no scans on /scan for 3 s (~scan_timeout: 2 s): the wheels carry on alone");
+}
+
+TEST_F(HealthTest, AllThatIsWrongIsSaidUnderTheWorstLevel) {
+  conditions_.waiting_for = "the mount";
+  const Verdict verdict = verdictAt(101.5);
+  EXPECT_EQ(verdict.level, Level::ERROR);
+  EXPECT_TRUE(contains(verdict.text, "the estimate waits; waiting for the mount"));
+}
+
+TEST_F(HealthTest, TimeThatGoesBackIsNoSilence) { EXPECT_EQ(verdictAt(10.0).level, Level::OK); }
+
+TEST_F(HealthTest, WaitingAndPauseAreWarnings) {
+  conditions_.waiting_for = "the mount";
+  EXPECT_EQ(verdictAt(100.1).text, "waiting for the mount");
+  conditions_.paused = true;
+  EXPECT_EQ(verdictAt(100.1).text, "paused");
+  EXPECT_EQ(verdictAt(100.1).level, Level::WARN);
+}
+
+TEST_F(HealthTest, ASlipIsAWarningUntilTheNextReportAndIsCounted) {
+  health_.scanTaken(scan(ScanOutcome::kSlip, 100.1));
+  EXPECT_EQ(verdictAt(100.1).text, "the wheels slip: the scans are believed");
+  EXPECT_EQ(value("wheels slip"), "True");
+  health_.scanTaken(scan(ScanOutcome::kUpdated, 100.2));
+  EXPECT_EQ(verdictAt(100.2).level, Level::OK);
+  EXPECT_EQ(value("wheels slip"), "False");
+  EXPECT_EQ(value("wheel slips"), "1");
+}
+
+TEST_F(HealthTest, AJumpOfTheOdometryIsAWarningUntilTheNextReport) {
+  conditions_.odometry_jumps = 1;
+  EXPECT_TRUE(contains(verdictAt(100.1).text, "odometry on /odom jumped"));
+  EXPECT_EQ(verdictAt(100.2).level, Level::OK);
+  health_.pipelineDropped("dropped, reset", 1);
+  conditions_.odometry_jumps = 0;
+  EXPECT_EQ(verdictAt(100.3).level, Level::OK);
+  EXPECT_EQ(value("odometry: jumps"), "1");
+  conditions_.odometry_jumps = 1;
+  EXPECT_EQ(verdictAt(100.4).level, Level::WARN);
+  EXPECT_EQ(value("odometry: jumps"), "2");
+}
+
+TEST_F(HealthTest, ManyScansInARowThatDidNotHelpAreAWarning) {
+  for (int i = 0; i < 9; ++i) health_.scanTaken(scan(ScanOutcome::kUnusable, 100.1, "no points"));
+  EXPECT_EQ(verdictAt(100.1).level, Level::OK);
+  health_.scanTaken(scan(ScanOutcome::kUnusable, 100.1, "no points"));
+  EXPECT_EQ(verdictAt(100.1).text, "the last 10 scans did not correct the estimate; the last one: unusable: no points");
+  health_.scanTaken(scan(ScanOutcome::kUpdated, 100.1));
+  EXPECT_EQ(verdictAt(100.1).level, Level::OK);
+}
+
+TEST_F(HealthTest, EveryScanIsAccountedFor) {
+  for (int i = 0; i < 6; ++i) health_.scans.came(at(100.0), at(100.0));  // with the first: 7
+  health_.scans.ended("refused, no stamp");
+  for (int i = 0; i < 4; ++i) health_.scanPassed();
+  health_.scanTaken(scan(ScanOutcome::kReference, 100.1));
+  health_.scanTaken(scan(ScanOutcome::kOutOfOrder, 100.1, "not newer"));
+  conditions_.scans_held_back = 1;
+  conditions_.scans_without_mount = 1;
+  verdictAt(100.1);
+  EXPECT_EQ(value("scans: received"), "7");
+  EXPECT_EQ(value("scans: together"), "3");
+  EXPECT_EQ(value("scans: refused"), "1");
+  EXPECT_EQ(value("scans: waiting for odometry"), "2");
+  EXPECT_EQ(value("scans: waiting for their mount"), "1");
+  EXPECT_EQ(value("scans: held back"), "1");
+  health_.pipelineDropped("dropped, reset", 0);
+  verdictAt(100.1);
+  EXPECT_EQ(value("scans: dropped, reset"), "2");
+  EXPECT_EQ(value("scans: together"), "5");
+}
+
+TEST_F(HealthTest, WhyScansDidNotMatchIsCounted) {
+  ScanReport report = scan(ScanOutcome::kNoMatch, 100.1, "no overlap");
+  report.match.failure = MatchFailure::kNoOverlap;
+  health_.scanTaken(report);
+  verdictAt(100.1);
+  EXPECT_EQ(value("scans: no match, no overlap"), "1");
+}
+
+TEST_F(HealthTest, RatesAndLatenciesAreThoseSinceTheLastReport) {
+  verdictAt(100.0);
+  for (int i = 1; i <= 20; ++i) health_.odometry.came(at(100.0 + 0.05 * i), at(100.0 + 0.05 * i + 0.01 * (i % 2)));
+  verdictAt(101.0);
+  EXPECT_EQ(value("odometry: rate [1/s]"), "20.0");
+  EXPECT_EQ(value("odometry: latency, mean [s]"), "0.005");
+  EXPECT_EQ(value("odometry: latency, longest [s]"), "0.010");
+  verdictAt(101.0);
+  EXPECT_EQ(value("odometry: rate [1/s]"), "0.0");
+  EXPECT_EQ(value("odometry: latency, mean [s]"), "missing");
+}
+
+TEST_F(HealthTest, TheLastComparisonAndTheAgeOfTheReferenceAreTold) {
+  ScanReport reference = scan(ScanOutcome::kReference, 100.0);
+  reference.new_reference = true;
+  health_.scanTaken(reference);
+  ScanReport compared = scan(ScanOutcome::kUpdated, 100.5);
+  compared.innovation = Innovation();
+  compared.innovation->residual = Eigen::Vector2d(1.0, 2.0);
+  compared.innovation->covariance = Eigen::Matrix2d::Identity();
+  health_.scanTaken(compared);
+  conditions_.newest_odometry = Stamp(std::chrono::milliseconds(100700));
+  verdictAt(100.7);
+  EXPECT_EQ(value("NIS"), "5.000");
+  EXPECT_EQ(value("observed dimension"), "2");
+  EXPECT_EQ(value("reference age [s]"), "0.700");
+  EXPECT_EQ(value("time of a scan, mean [ms]"), "2.000");
+}
+
+}  // namespace
+}  // namespace sckf
