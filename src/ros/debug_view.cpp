@@ -8,7 +8,7 @@ namespace sckf {
 
 namespace {
 
-constexpr uint32_t kQueue = 10;
+constexpr uint32_t kQueue = 100;  // at fast replay many leave in one go
 
 /// The scan drawn in odom; empty if there is none.
 sensor_msgs::PointCloud2 toCloud(const PlacedScan& placed, Stamp stamp, const std::string& frame) {
