@@ -81,7 +81,7 @@ PipelineOptions options(Bytes& bytes) {
   options.odometry_timeout = 0.1 * (1 + bytes.upTo(19));
   options.reference.kf_dist_linear = 0.5 * bytes.upTo(2);
   options.gate.trust_scans_on_slip = bytes.chance();
-  options.scan.max_beams = bytes.chance() ? 60 : 4000;
+  options.scan.max_beams = bytes.chance() ? 60 : 400;
   return options;
 }
 

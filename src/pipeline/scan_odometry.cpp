@@ -49,14 +49,6 @@ double chiSquared(Eigen::Index degrees_of_freedom, double p) {
   return boost::math::quantile(boost::math::chi_squared(static_cast<double>(degrees_of_freedom)), p);
 }
 
-ScanReport notUsed(Stamp stamp, ScanOutcome outcome, const std::string& reason) {
-  ScanReport report;
-  report.stamp = stamp;
-  report.outcome = outcome;
-  report.reason = reason;
-  return report;
-}
-
 std::string describe(const Innovation& innovation, double bound) {
   std::ostringstream text;
   text << "normalised innovation squared " << innovation.nis() << " exceeds " << bound << " ("
@@ -65,28 +57,6 @@ std::string describe(const Innovation& innovation, double bound) {
 }
 
 }  // namespace
-
-std::string toString(ScanOutcome outcome) {
-  switch (outcome) {
-    case ScanOutcome::kReference:
-      return "reference";
-    case ScanOutcome::kUpdated:
-      return "updated";
-    case ScanOutcome::kSlip:
-      return "slip";
-    case ScanOutcome::kGated:
-      return "gated";
-    case ScanOutcome::kNoMatch:
-      return "no match";
-    case ScanOutcome::kUnusable:
-      return "unusable";
-    case ScanOutcome::kOutOfOrder:
-      return "out of order";
-    case ScanOutcome::kNoOdometry:
-      return "no odometry";
-  }
-  return "unknown";
-}
 
 ScanOdometry::ScanOdometry(const PipelineOptions& options, const SE2& odom_from_base, const Eigen::Matrix3d& covariance)
     : options_(options),

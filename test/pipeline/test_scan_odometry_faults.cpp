@@ -184,7 +184,7 @@ TEST(ScanOdometryFaults, AHundredThousandBeamsTakeNoLongerThanTheMostAllowed) {
   EXPECT_EQ(driven.count(ScanOutcome::kUpdated), 5U);
   expectAccurate(drive, driven);
   for (const ScanReport& report : driven.reports) {
-    EXPECT_EQ(report.scan->beams, 4000U);
+    EXPECT_EQ(report.scan->beams, 2041U);  // every 49th
     EXPECT_LT(report.match_time, report.total_time + 1e-9);
     EXPECT_LT(report.total_time, 2.0) << "bounded, however slow the machine";
   }

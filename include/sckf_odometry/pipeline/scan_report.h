@@ -1,0 +1,54 @@
+// What comes out of the pipeline: estimates, and what became of each scan.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "sckf_odometry/matching/scan_matcher.h"
+#include "sckf_odometry/pipeline/twist_window.h"
+
+namespace sckf {
+
+/// Where base_link is in odom, with the covariance of the additive error in x, y, yaw.
+struct Estimate {
+  Stamp stamp{0};
+  SE2 odom_from_base;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  Twist twist;
+};
+
+/// What became of a scan.
+enum class ScanOutcome {
+  kReference,   ///< the first scan: it became the reference, there is nothing to compare it with
+  kUpdated,     ///< its displacement corrected the estimate
+  kSlip,        ///< its displacement contradicts the wheels, and corrected the estimate: the wheels slipped
+  kGated,       ///< its displacement contradicts the prediction beyond the gate: the wheels carry on
+  kNoMatch,     ///< there is no displacement: the wheels carry on
+  kUnusable,    ///< the scan itself is bad: the wheels carry on
+  kOutOfOrder,  ///< not newer than the estimate: not used
+  kNoOdometry,  ///< no odometry at its stamp: not used
+};
+std::string toString(ScanOutcome outcome);
+
+struct ScanReport {
+  Stamp stamp{0};
+  ScanOutcome outcome = ScanOutcome::kReference;
+  std::string reason;                        ///< in words, where the scan did not correct the estimate
+  std::optional<Estimate> estimate;          ///< at the scan's stamp; empty if out of order or without odometry
+  Match match;                               ///< of a scan that was compared with a reference
+  DisplacementPrediction prediction;         ///< what the filter expected
+  std::optional<Innovation> innovation;      ///< where there is a displacement
+  double nis_bound = 0.0;                    ///< what contradicts the prediction has a larger nis()
+  Stamp reference_stamp{0};                  ///< of the scan that it was compared with
+  bool new_reference = false;                ///< it became the reference
+  bool wheels_known = true;                  ///< false: wheels did not tell all of the motion since the scan before
+  double match_time = 0.0;                   ///< [s] spent on the comparison with the reference …
+  double total_time = 0.0;                   ///< [s] … and on the scan on the whole
+  std::shared_ptr<const PreparedScan> scan;  ///< its points in base_link; null if it was not used
+};
+
+/// Of a scan that is not used.
+ScanReport notUsed(Stamp stamp, ScanOutcome outcome, const std::string& reason);
+
+}  // namespace sckf
