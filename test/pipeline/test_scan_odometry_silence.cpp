@@ -189,6 +189,27 @@ TEST(ScanOdometrySilence, TheTwistOfScansAloneIsTheEstimatesOwn) {
   EXPECT_GT(squares / count, 0.02) << "far better than it says";
 }
 
+/// Each scan that is used tells the motion anew: what is guessed up to the next one is of 0.1 s, not of the whole
+/// silence.
+TEST(ScanOdometrySilence, TheGuessBeginsAnewAtEachScanThatIsUsed) {
+  const SimulatedDrive drive;
+  PipelineOptions options = scansAlone();
+  options.reference.kf_dist_linear = options.reference.kf_dist_angular = 0.0;  // the prediction is from scan to scan
+  Driven driven(drive, options);
+  driven.odometry(0);
+  driven.run(0, kSilentFrom);
+  driven.scansOnly(kSilentFrom, 9000);
+  for (const ScanReport& report : driven.reports) {
+    const int ms = milliseconds(report.stamp);
+    if (ms < kSilentFrom + 500) continue;
+    const SE2 truth = between(drive.truth(ms - 100), drive.truth(ms));
+    const Eigen::Vector3d e = error(report.prediction.reference_from_current, truth);
+    EXPECT_LT(e.head<2>().norm(), 0.03) << "at " << ms << " ms: " << e.transpose();
+    EXPECT_NEAR(std::sqrt(report.prediction.covariance(0, 0)), 0.1 * options.motion.unknown_speed_std, 0.01);
+    EXPECT_NEAR(std::sqrt(report.prediction.covariance(2, 2)), 0.1 * options.motion.unknown_yaw_rate_std, 0.01);
+  }
+}
+
 /// Late, but not silent: as soon as odometry comes again, scans wait for it instead of running ahead of it for ever.
 TEST(ScanOdometrySilence, ScansWaitAgainForWheelsThatComeBackLate) {
   const SimulatedDrive drive;
