@@ -24,7 +24,7 @@ std::size_t MessageTally::together() const {
 }
 
 std::optional<double> MessageTally::silence(const ros::Time& now) const {
-  if (received_ == 0) return std::nullopt;
+  if (last_.isZero()) return std::nullopt;
   return std::max(0.0, now.toSec() - last_.toSec());
 }
 

@@ -65,7 +65,9 @@ ScKfOdometryNode::ScKfOdometryNode(ros::NodeHandle nh, const ros::NodeHandle& pr
 }
 
 ScKfOdometryNode::~ScKfOdometryNode() {
-  guarded([this] { keepPose(); });
+  const std::lock_guard<std::mutex> lock(mutex_);
+  // Nothing is said of a failure: where the process ends, roscpp's log may have ended already.
+  if (const auto latest = pipeline_->latest()) pose_keeper_.keep(*latest);
 }
 
 void ScKfOdometryNode::subscribe(ros::NodeHandle& nh) {
@@ -282,7 +284,9 @@ void ScKfOdometryNode::pause(bool paused) {
 }
 
 void ScKfOdometryNode::keepPose() {
-  if (const auto latest = pipeline_->latest()) pose_keeper_.keep(*latest);
+  const std::optional<Estimate> latest = pipeline_->latest();
+  const std::string problem = latest ? pose_keeper_.keep(*latest) : "";
+  if (!problem.empty()) warnings_.warn("state file", "~state_file not written: " + problem);
 }
 
 void ScKfOdometryNode::warnOfSecondParent(const ros::MessageEvent<const tf2_msgs::TFMessage>& event) {

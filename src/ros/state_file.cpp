@@ -98,16 +98,13 @@ std::optional<SavedPose> PoseKeeper::takeUp(Stamp first_odometry) {
   return std::nullopt;
 }
 
-void PoseKeeper::keep(const Estimate& estimate) {
-  if (options_.state_file.empty() || saved_ || estimate.stamp == written_) return;
+std::string PoseKeeper::keep(const Estimate& estimate) {
+  if (options_.state_file.empty() || saved_ || estimate.stamp == written_) return "";
   std::string problem;
   const SavedPose pose{options_.odom_frame, options_.base_frame, estimate.stamp, estimate.odom_from_base,
                        estimate.covariance};
-  if (StateFile(options_.state_file).write(pose, &problem)) {
-    written_ = estimate.stamp;
-  } else {
-    ROS_WARN_STREAM_THROTTLE_NAMED(60.0, kLogger, "~state_file not written: " << problem);
-  }
+  if (StateFile(options_.state_file).write(pose, &problem)) written_ = estimate.stamp;
+  return problem;
 }
 
 }  // namespace sckf

@@ -77,12 +77,17 @@ class Recorder:
         self._diagnostics = {}
         self._levels = []
         self._node_name = node_name
-        for topic, kind in self.TOPICS.items():
+        self._subscribers = [
             rospy.Subscriber(namespace + topic, kind, self._record, topic, queue_size=None, tcp_nodelay=True)
+            for topic, kind in self.TOPICS.items()
+        ]
         rospy.Subscriber('/tf', TFMessage, self._record_transforms, False, queue_size=None)
         rospy.Subscriber('/tf_static', TFMessage, self._record_transforms, True, queue_size=None)
         rospy.Subscriber('/rosout', Log, lambda message: self._log.append(message), queue_size=None)
         rospy.Subscriber('/diagnostics', DiagnosticArray, self._record_diagnostics, queue_size=None)
+
+    def wait_for_connection(self):
+        wait_until(lambda: all(s.get_num_connections() > 0 for s in self._subscribers), 'the topics of the node')
 
     def _record(self, message, topic):
         with self._lock:

@@ -77,6 +77,14 @@ TEST_F(HealthTest, AllThatIsWrongIsSaidUnderTheWorstLevel) {
   EXPECT_TRUE(contains(verdict.text, "the estimate waits; waiting for the mount"));
 }
 
+TEST_F(HealthTest, MessagesBeforeThereIsATimeAreNoSilence) {
+  Health health("/odom", "/scan");
+  health.odometry.came(at(1000.0), ros::Time());
+  health.scans.came(at(1000.0), ros::Time());
+  health.report(conditions_, options_, at(1000.0), status_);
+  EXPECT_EQ(status_.message, "estimating");
+}
+
 TEST_F(HealthTest, TimeThatGoesBackIsNoSilence) { EXPECT_EQ(verdictAt(10.0).level, Level::OK); }
 
 TEST_F(HealthTest, WaitingAndPauseAreWarnings) {

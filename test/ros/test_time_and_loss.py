@@ -178,12 +178,16 @@ class Robots:
         self.levels = {name: [] for name in CASES}
         self.counts = {name: {} for name in CASES}
         self.log = []
+        self._subscribers = [rospy.Subscriber('/tf', TFMessage, self._record_transforms, queue_size=None)]
         for name in CASES:
-            rospy.Subscriber('/%s/odometry/filtered' % name, Odometry, self.odometry[name].append, queue_size=None)
-            rospy.Subscriber('/%s/status' % name, Status, self.status[name].append, queue_size=None)
-        rospy.Subscriber('/tf', TFMessage, self._record_transforms, queue_size=None)
+            for topic, kind, record in (('odometry/filtered', Odometry, self.odometry[name].append),
+                                        ('status', Status, self.status[name].append)):
+                self._subscribers.append(rospy.Subscriber('/%s/%s' % (name, topic), kind, record, queue_size=None))
         rospy.Subscriber('/diagnostics', DiagnosticArray, self._record_diagnostics, queue_size=None)
         rospy.Subscriber('/rosout', Log, lambda message: self.log.append(message.msg), queue_size=None)
+
+    def are_connected(self):
+        return all(subscriber.get_num_connections() > 0 for subscriber in self._subscribers)
 
     def _record_transforms(self, message):
         for transform in message.transforms:
@@ -227,8 +231,10 @@ class TimeAndLoss(unittest.TestCase):
                 publishers[name, topic] = rospy.Publisher('/%s/%s' % (name, topic), kind, queue_size=1000, tcp_nodelay=True)
         for publisher in publishers.values():
             helpers.wait_until(lambda publisher=publisher: publisher.get_num_connections() > 0, publisher.name)
+        helpers.wait_until(cls.robots.are_connected, 'the topics of all nodelets')
         cls.feed(clock, publishers, drives)
         helpers.wait_until(cls.all_has_come, 'diagnostics that account for everything')
+        helpers.wait_until(lambda: all(len(cls.robots.tf[name]) == len(cls.robots.odometry[name]) for name in CASES), 'TF')
 
     @classmethod
     def feed(cls, clock, publishers, drives):

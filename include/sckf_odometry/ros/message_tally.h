@@ -20,7 +20,7 @@ class MessageTally {
   std::size_t together() const;  ///< that have ended
   const std::map<std::string, std::size_t>& ends() const { return ends_; }
 
-  /// [s] since the last one came; empty before the first. Zero where time has gone back.
+  /// [s] since the last one came; empty before the first, or before there was a time. Zero where it has gone back.
   std::optional<double> silence(const ros::Time& now) const;
 
   /// Since the last call.

@@ -47,8 +47,8 @@ class PoseKeeper {
   /// What was read is not wanted any more: somebody has said where the robot is.
   void forget() { saved_.reset(); }
 
-  /// Writes the estimate, unless it is there already.
-  void keep(const Estimate& estimate);
+  /// Writes the estimate, unless it is there already. Returns what is wrong, empty if nothing is.
+  std::string keep(const Estimate& estimate);
 
  private:
   NodeOptions options_;
