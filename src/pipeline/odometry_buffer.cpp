@@ -1,6 +1,7 @@
 #include "sckf_odometry/pipeline/odometry_buffer.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 namespace sckf {
@@ -90,6 +91,7 @@ void OdometryBuffer::bridge(Stamp stamp, const MotionGuess& guess) {
 }
 
 OdometryBuffer::Entry OdometryBuffer::at(Stamp stamp) const {
+  assert(covers(stamp));
   const auto after = std::lower_bound(samples_.begin(), samples_.end(), stamp, earlier);
   if (after->stamp == stamp) return *after;
   const auto before = std::prev(after);

@@ -80,6 +80,7 @@ OdometryBuffer::Insertion ScanOdometry::addOdometry(const OdometrySample& sample
   if (insertion != Insertion::kInserted) return insertion;
   followWheels(newest_before);
   if (!filter_) begin(start_, start_covariance_, sample.stamp);
+  carryOn();  // first: what the filter takes is forgotten
   // Without scans the filter follows the wheels at a distance, so that the buffer stays small; from sample to sample,
   // so that it makes no difference when the samples arrived.
   const Stamp too_old = odometry_.newest() - fromSeconds(options_.max_scan_delay);
@@ -87,7 +88,6 @@ OdometryBuffer::Insertion ScanOdometry::addOdometry(const OdometrySample& sample
     const Stamp last = odometry_.lastUpTo(too_old);
     if (last > filter_stamp_) propagateTo(last);
   }
-  carryOn();
   return insertion;
 }
 

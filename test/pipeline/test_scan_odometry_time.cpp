@@ -305,6 +305,19 @@ TEST(ScanOdometryTime, OdometryFromTheFutureIsNotFollowed) {
   }
 }
 
+/// Samples farther apart than a scan may be late: each waits for the next one, and all are followed.
+TEST(ScanOdometryTime, SparseOdometryIsFollowed) {
+  const SimulatedDrive drive(Wheels(), 60000);
+  Driven driven(drive);
+  for (int ms = 0; ms <= 60000; ms += 6000) {
+    driven.odometry(ms);
+    const int confirmed = ms - ms % 12000;  // with every second sample the one before it
+    ASSERT_EQ(driven.pipeline.latest()->stamp, at(confirmed));
+    const Eigen::Vector3d e = error(driven.pipeline.latest()->odom_from_base, drive.wheels(confirmed));
+    EXPECT_LT(e.cwiseAbs().maxCoeff(), 1e-9) << e.transpose() << " at " << ms;
+  }
+}
+
 /// It waits for its time, and does not get into the way of others: not even if there are as many as may wait.
 TEST(ScanOdometryTime, ScansFromTheFutureWaitForTheirTime) {
   const SimulatedDrive drive;
