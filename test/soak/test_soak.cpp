@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <cstdlib>
 #include <fstream>
 #include <iostream>
 #include <limits>
@@ -14,6 +16,15 @@
 #include "soak/endless_drive.h"
 #include "soak/host.h"
 #include "soak/watch.h"
+
+namespace {
+
+std::atomic<int> thread_sanitizer_reports{0};
+
+}  // namespace
+
+/// Called by the thread sanitizer for each report that is not suppressed.
+extern "C" void __tsan_on_report(void* /*report*/) { ++thread_sanitizer_reports; }
 
 namespace sckf::test {
 namespace {
@@ -169,6 +180,10 @@ TEST_F(Soak, GoodScansAreUsed) {
 TEST_F(Soak, EachScanWithAStampOfItsOwnHasAPose) {
   EXPECT_EQ(watch->poses(), sent.good + sent.displaced + sent.blind);
 }
+
+#ifdef __SANITIZE_THREAD__
+TEST_F(Soak, ThreadsDoNotRace) { EXPECT_EQ(thread_sanitizer_reports, 0) << "see log_path in " << std::getenv("TSAN_OPTIONS"); }
+#endif
 
 TEST_F(Soak, MemoryIsFlat) {
   if (settings->max_growth <= 0.0) GTEST_SKIP() << "not looked at";
