@@ -1,0 +1,70 @@
+#!/usr/bin/python3
+"""What the README says to those who come from other packages: the names are those of the package as it is."""
+from __future__ import annotations
+
+import re
+import unittest
+from pathlib import Path
+from typing import Dict, List, Set
+
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+TOPIC_OR_SERVICE = re.compile(r"(?:topics?|services?|TF) (?:(?:, )?`[^`]*`)+(?: → `[^`]*`)?")
+
+
+def rows() -> List[List[str]]:
+    """The cells of the tables in the sections "Coming from …", without their headings."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    sections = re.findall(r"^## Coming from .*?(?=^## (?!Coming from))", text, re.MULTILINE | re.DOTALL)
+    lines = "".join(sections).splitlines()
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("| ")]
+    return [row for row in cells if "`" in row[0]]
+
+
+def names(cell: str) -> Set[str]:
+    return set(re.findall(r"`([a-z_0-9]+)`", cell))
+
+
+def parameters() -> Set[str]:
+    return set(yaml.safe_load((ROOT / "config" / "sckf_odometry.yaml").read_text(encoding="utf-8")))
+
+
+def aliases() -> Dict[str, str]:
+    source = (ROOT / "src" / "ros" / "parameter_list.cpp").read_text(encoding="utf-8")
+    return dict(re.findall(r'\{"(\w+)", "(\w+)"\}', source[source.index("kAliases"):]))
+
+
+class ReadmeTest(unittest.TestCase):
+    def test_there_are_two_tables(self) -> None:
+        self.assertGreater(len(rows()), 30)
+
+    def test_what_is_named_as_a_parameter_of_ours_is_one(self) -> None:
+        for row in rows():
+            self.assertLessEqual(names(TOPIC_OR_SERVICE.sub("", row[1])), parameters(), row)
+
+    def test_what_works_is_an_alias(self) -> None:
+        working = [row for row in rows() if "**works**" in row[2]]
+        self.assertGreaterEqual(len(working), 3)
+        for row in working:
+            old, new = (next(iter(re.findall(r"`(\w+)`", cell))) for cell in row[:2])
+            self.assertEqual(aliases().get(old), new, row)
+
+    def test_every_alias_of_these_packages_is_told(self) -> None:
+        told = {name for row in rows() if "**works**" in row[2] for name in names(row[0])}
+        of_others = {"odom_frame_id", "base_frame_id"}  # rf2o, amcl
+        self.assertLessEqual(set(aliases()) - of_others, told)
+
+    def test_what_is_the_same_is_a_parameter(self) -> None:
+        for row in rows():
+            if row[1].startswith("the same (") or row[1] == "the same" and "topic" not in row[0]:
+                self.assertLessEqual(names(row[0]), parameters(), row)
+
+    def test_the_examples_that_it_names_are_there(self) -> None:
+        text = (ROOT / "README.md").read_text(encoding="utf-8")
+        told = set(re.findall(r"^\| `(\w+\.launch)", text, re.MULTILINE))
+        self.assertEqual(told, {path.name for path in (ROOT / "config" / "examples").glob("*.launch")})
+
+
+if __name__ == "__main__":
+    unittest.main()
