@@ -45,8 +45,8 @@ class EndlessDrive {
     const SE2 motion = odometry_ == 1 ? SE2() : between(path_, now);
     const double way = motion.translation().norm();
     path_ = now;
-    wheels_ = compose(wheels_, SE2(1.03 * motion.x, motion.y,
-                                   motion.yaw + 0.02 * way + 0.02 * std::sqrt(way) * normal_(random_)));
+    wheels_ = compose(
+        wheels_, SE2(1.03 * motion.x, motion.y, motion.yaw + 0.02 * way + 0.02 * std::sqrt(way) * normal_(random_)));
     Estimate estimate;
     estimate.stamp = stamp;
     estimate.odom_from_base = wheels_;

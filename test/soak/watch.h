@@ -29,10 +29,10 @@ class Watch {
     spinner_.start();
   }
 
-  /// Until there is an estimate for that time; false if there is none within a minute.
-  bool waitFor(Stamp stamp) {
+  /// Until there is an estimate for that time, and poses of so many scans; false if not within a minute.
+  bool waitFor(Stamp stamp, std::size_t poses) {
     std::unique_lock<std::mutex> lock(mutex_);
-    return news_.wait_for(lock, std::chrono::minutes(1), [&] { return newest_ >= stamp; });
+    return news_.wait_for(lock, std::chrono::minutes(1), [&] { return newest_ >= stamp && poses_ >= poses; });
   }
 
   /// Until the diagnostics account for so many scans; false if they don't within a minute.
@@ -47,11 +47,14 @@ class Watch {
     return accounted(what);
   }
 
-  /// All that they say of the scans, in one line.
+  /// All the numbers of scans that they tell, in one line.
   std::string allScans() {
     const std::lock_guard<std::mutex> lock(mutex_);
     std::string text;
-    for (const auto& [key, value] : said_) text += key.rfind("scans: ", 0) == 0 ? key.substr(7) + " " + value + ", " : "";
+    for (const auto& [key, value] : said_) {
+      const bool has_unit = key.find('[') != std::string::npos;
+      if (key.rfind("scans: ", 0) == 0 && !has_unit) text += key.substr(7) + " " + value + ", ";
+    }
     return text;
   }
 
@@ -92,6 +95,7 @@ class Watch {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++poses_;
     if (!believable(message->pose)) ++bad_;
+    news_.notify_all();
   }
 
   void onDiagnostics(const diagnostic_msgs::DiagnosticArray::ConstPtr& message) {
