@@ -2,14 +2,16 @@
 
 #include "sckf_odometry/core/dead_reckoning.h"
 #include "sckf_odometry/core/displacement_only.h"
+#include "sckf_odometry/core/multi_clone_filter.h"
 #include "sckf_odometry/core/pseudo_absolute.h"
 #include "sckf_odometry/core/stochastic_cloning_filter.h"
 
 namespace sckf {
 
 const std::vector<std::string>& fusionMethodNames() {
-  static const std::vector<std::string> names{"sckf",           "sckf_nc",           "pseudo_absolute",
-                                              "dead_reckoning", "displacement_only", "displacement_only_nc"};
+  static const std::vector<std::string> names{"sckf_multi",          "sckf",           "sckf_nc",
+                                              "pseudo_absolute",     "dead_reckoning", "displacement_only",
+                                              "displacement_only_nc"};
   return names;
 }
 
@@ -18,6 +20,7 @@ std::unique_ptr<FusionMethod> makeFusionMethod(const std::string& name, const SE
   using Filter = StochasticCloningFilter;
   if (name == "sckf") return std::make_unique<Filter>(odom_from_base, covariance, Filter::Correlations::kKept);
   if (name == "sckf_nc") return std::make_unique<Filter>(odom_from_base, covariance, Filter::Correlations::kIgnored);
+  if (name == "sckf_multi") return std::make_unique<MultiCloneFilter>(odom_from_base, covariance);
   if (name == "pseudo_absolute") return std::make_unique<PseudoAbsolute>(odom_from_base, covariance);
   if (name == "dead_reckoning") return std::make_unique<DeadReckoning>(odom_from_base, covariance);
   if (name == "displacement_only") {

@@ -42,6 +42,9 @@ class Search {
     return best;
   }
 
+  /// From the predicted displacement, which is good, and nowhere else.
+  std::optional<Alignment> runNear() const { return align(mean_, true); }
+
  private:
   static Eigen::Matrix3d priorFloor(const MatcherOptions& options) {
     return Eigen::Vector3d(options.prior_std_translation, options.prior_std_translation, options.prior_std_yaw)
@@ -81,10 +84,10 @@ class Search {
 
   /// CICP, then the maximum of the posterior of surfaces and prior: the prior decides which points belong together in
   /// directions that the scans hardly see, where CICP slides. Empty with too few pairs.
-  std::optional<Alignment> align(const SE2& start) const {
+  std::optional<Alignment> align(const SE2& start, bool near = false) const {
     constexpr double kSettled = 1e-4;  // [m, rad]
-    SE2 x = icp(start);
-    double distance = options_.icp_pair_distance;
+    SE2 x = near ? start : icp(start);
+    double distance = near ? options_.pairs.max_distance : options_.icp_pair_distance;
     for (int i = 0; i < options_.max_iterations; ++i) {
       const AlignmentProblem problem(reference_, current_, x, distance, options_.pairs);
       if (tooFew(problem)) return std::nullopt;
@@ -132,6 +135,35 @@ class Search {
   const MatcherOptions& options_;
 };
 
+bool ranAway(const SE2& estimated, const SE2& aligned, const MatcherOptions& options) {
+  const Eigen::Vector3d moved = error(estimated, aligned);
+  return !moved.allFinite() || moved.cwiseAbs().maxCoeff() > options.max_refinement;
+}
+
+/// The match that an alignment comes to, or why it comes to none.
+Match concluded(const std::optional<Alignment>& aligned, const MatcherOptions& options) {
+  Match match;
+  if (!aligned) {
+    match.failure = MatchFailure::kTooFewPairs;
+    return match;
+  }
+  const SE2& start = aligned->reference_from_current;
+  std::optional<DisplacementEstimate> estimate = estimateDisplacement(aligned->problem, start, options.estimation);
+  match.pairs = aligned->problem.pairs();
+  match.overlap = aligned->problem.overlap();
+  match.residual_rms = estimate ? estimate->residual_rms : 0.0;
+  if (match.overlap < options.min_overlap) {
+    match.failure = MatchFailure::kNoOverlap;
+  } else if (!estimate) {
+    match.failure = MatchFailure::kNotObservable;
+  } else if (ranAway(estimate->displacement.reference_from_current, start, options)) {
+    match.failure = MatchFailure::kDiverged;
+  } else {
+    match.displacement.emplace(std::move(estimate->displacement));
+  }
+  return match;
+}
+
 }  // namespace
 
 std::string toString(MatchFailure failure) {
@@ -152,32 +184,12 @@ std::string toString(MatchFailure failure) {
 
 Match ScanMatcher::match(const PreparedScan& reference, const PreparedScan& current,
                          const DisplacementPrediction& prediction) const {
-  Match match;
-  const std::optional<Alignment> aligned = Search(reference, current, prediction, options_).run();
-  if (!aligned) {
-    match.failure = MatchFailure::kTooFewPairs;
-    return match;
-  }
-  const SE2& start = aligned->reference_from_current;
-  std::optional<DisplacementEstimate> estimate = estimateDisplacement(aligned->problem, start, options_.estimation);
-  match.pairs = aligned->problem.pairs();
-  match.overlap = aligned->problem.overlap();
-  match.residual_rms = estimate ? estimate->residual_rms : 0.0;
-  if (match.overlap < options_.min_overlap) {
-    match.failure = MatchFailure::kNoOverlap;
-  } else if (!estimate) {
-    match.failure = MatchFailure::kNotObservable;
-  } else if (ranAway(estimate->displacement.reference_from_current, start)) {
-    match.failure = MatchFailure::kDiverged;
-  } else {
-    match.displacement.emplace(std::move(estimate->displacement));
-  }
-  return match;
+  return concluded(Search(reference, current, prediction, options_).run(), options_);
 }
 
-bool ScanMatcher::ranAway(const SE2& estimated, const SE2& aligned) const {
-  const Eigen::Vector3d moved = error(estimated, aligned);
-  return !moved.allFinite() || moved.cwiseAbs().maxCoeff() > options_.max_refinement;
+Match ScanMatcher::matchNear(const PreparedScan& reference, const PreparedScan& current,
+                             const DisplacementPrediction& prediction) const {
+  return concluded(Search(reference, current, prediction, options_).runNear(), options_);
 }
 
 }  // namespace sckf

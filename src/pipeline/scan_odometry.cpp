@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
+#include <cmath>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -120,7 +121,7 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   const Clock::time_point begin = Clock::now();
   const Stamp stamp = waiting.scan.stamp;
   if (!odometry_.covers(stamp)) return notUsed(stamp, ScanOutcome::kNoOdometry, "older than the odometry at hand");
-  if (stamp < filter_stamp_ || (reference_ && stamp == filter_stamp_)) {
+  if (stamp < filter_stamp_ || (!references_.empty() && stamp == filter_stamp_)) {
     return notUsed(stamp, ScanOutcome::kOutOfOrder, "not newer than the estimate");
   }
   ScanReport report;
@@ -132,15 +133,16 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   report.scan = prepareScan(waiting.scan, waiting.base_from_laser, options_.scan, &report.reason);
   if (!report.scan) {
     report.outcome = ScanOutcome::kUnusable;
-  } else if (!reference_) {
+  } else if (references_.empty()) {
     report.new_reference = true;
   } else {
     compareWithReference(report);  // (16)-(23)
   }
   if (odometry_.endsBridged()) followScans(before, at_before, report);
   if (report.new_reference) {
+    compareWithOlderReferences(report);
     filter_->clone(report.scan->rangeVariances());  // (24)-(27)
-    reference_ = report.scan;
+    references_.add(report.scan, options_.reference.kept, *filter_);
   }
   report.estimate = estimate();
   carried_on_.reset();
@@ -150,10 +152,11 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
 }
 
 void ScanOdometry::compareWithReference(ScanReport& report) {
-  report.reference_stamp = reference_->stamp;
+  const PreparedScan& reference = references_.newest();
+  report.reference_stamp = reference.stamp;
   report.prediction = filter_->predictedDisplacement();  // (16)
   const Clock::time_point begin = Clock::now();
-  report.match = matcher_.match(*reference_, *report.scan, report.prediction);  // (1)
+  report.match = matcher_.match(reference, *report.scan, report.prediction);  // (1)
   report.match_time = secondsSince(begin);
   const bool used = report.match.displacement ? fuse(report) : false;  // (17)-(23)
   if (!report.match.displacement) {
@@ -166,7 +169,7 @@ void ScanOdometry::compareWithReference(ScanReport& report) {
 
 bool ScanOdometry::fuse(ScanReport& report) {
   const Displacement& displacement = *report.match.displacement;
-  const double bound = chiSquared(displacement.dimension(), options_.gate.probability);
+  const double bound = gate(displacement);
   report.innovation = filter_->innovation(displacement);
   report.nis_bound = bound;
   report.outcome = ScanOutcome::kUpdated;
@@ -184,6 +187,28 @@ bool ScanOdometry::fuse(ScanReport& report) {
   }
   filter_->update(displacement, *report.innovation);
   return true;
+}
+
+void ScanOdometry::compareWithOlderReferences(ScanReport& report) {
+  const ReferenceOptions& options = options_.reference;
+  for (const std::size_t clone : references_.worthComparing(*filter_, options)) {
+    DisplacementPrediction prediction = filter_->predictedDisplacementFrom(clone);
+    const Eigen::Matrix3d slack = referenceSlack(clone, options);
+    prediction.covariance += slack;
+    Match match = matcher_.matchNear(references_[clone], *report.scan, prediction);
+    if (!match.displacement || match.overlap < options.older_min_overlap) continue;
+    Displacement& displacement = *match.displacement;
+    displacement.clone = clone;
+    const Innovation innovation = filter_->innovation(displacement);
+    if (innovation.nis(displacement.observable * slack * displacement.observable.transpose()) > gate(displacement))
+      continue;
+    filter_->update(displacement, innovation);
+    ++report.older_references;
+  }
+}
+
+double ScanOdometry::gate(const Displacement& displacement) const {
+  return chiSquared(displacement.dimension(), options_.gate.probability);
 }
 
 bool ScanOdometry::looksLikeSlip(const Match& match) const {
@@ -222,7 +247,7 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
   filter_stamp_ = stamp;
   odometry_.discardBefore(stamp);
   wheels_known_ = true;
-  reference_.reset();
+  references_.clear();
   reference_policy_ = ReferencePolicy(options_.reference);
   carried_on_.reset();
   carryOn();

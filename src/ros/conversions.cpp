@@ -2,6 +2,7 @@
 
 #include <sensor_msgs/point_cloud2_iterator.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <sstream>
@@ -229,6 +230,7 @@ sckf_odometry::Status toStatus(const ScanReport& report, const std::string& meth
   status.reason = report.reason;
   status.accepted = report.outcome == ScanOutcome::kUpdated || report.outcome == ScanOutcome::kSlip;
   status.new_reference = report.new_reference;
+  status.older_references = static_cast<std::uint8_t>(std::min(report.older_references, 255));
   status.wheels_known = report.wheels_known;
   status.pairs = static_cast<uint32_t>(report.match.pairs.size());
   status.overlap = report.match.overlap;

@@ -5,19 +5,19 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
+#include <deque>
+#include <memory>
 #include <ostream>
 #include <string>
 #include <tuple>
 #include <vector>
 
 #include "room_simulation.h"
+#include "sckf_odometry/core/fusion_method.h"
 #include "sckf_odometry/core/odometry_model.h"
-#include "sckf_odometry/core/stochastic_cloning_filter.h"
 
 namespace sckf {
 namespace {
-
-using Correlations = StochasticCloningFilter::Correlations;
 
 constexpr int kRuns = 200;
 constexpr int kScans = 60;
@@ -59,7 +59,8 @@ OdometryNoise wheelNoise() {
 struct Experiment {
   World world = kRoom;
   int scans_per_reference = 1;
-  Correlations correlations = Correlations::kKept;
+  std::string method = "sckf";
+  std::size_t references = 1;   // kept; a scan that becomes a reference is compared with all of them
   double start_std = 1e-3;      // of x, y [m] and yaw [rad]
   double start_yaw_std = 1e-3;  // [rad]
   int pose_set_at = 0;          // scan after which the pose is told anew; 0: never
@@ -89,30 +90,42 @@ void run(const Experiment& experiment, RandomInputs& random, Statistics& sums) {
   const Eigen::Matrix3d P_0 = start_std.cwiseAbs2().asDiagonal();
   SE2 odom_from_base = experiment.world.start;  // the truth
   const auto told = [&](const Eigen::Matrix3d& P) {
-    return StochasticCloningFilter(corrected(odom_from_base, random.drawnFrom(P)), P, experiment.correlations);
+    return makeFusionMethod(experiment.method, corrected(odom_from_base, random.drawnFrom(P)), P);
   };
-  StochasticCloningFilter filter = told(P_0);
-  SimulatedScan reference = room.scan(odom_from_base, random);
-  filter.clone(reference.variance);
+  std::unique_ptr<FusionMethod> filter = told(P_0);
+  std::deque<SimulatedScan> references{room.scan(odom_from_base, random)};
+  filter->clone(references.front().variance);
 
   for (int scan = 1; scan <= kScans; ++scan) {
     for (int i = 0; i < kIncrementsPerScan; ++i) {
       const SE2 moved = motion(experiment.world, kIncrementsPerScan * scan + i);
       const Eigen::Matrix3d Q = modelledIncrement(moved, wheelNoise()).covariance;
-      filter.propagate({corrected(moved, random.drawnFrom(Q)), Q});
+      filter->propagate({corrected(moved, random.drawnFrom(Q)), Q});
       odom_from_base = compose(odom_from_base, moved);
     }
     const SimulatedScan current = room.scan(odom_from_base, random);
-    const Displacement z = room.match(reference, current, random);
-    ASSERT_EQ(z.dimension(), experiment.world.directions);
-    const Innovation innovation = filter.innovation(z);
-    filter.update(z, innovation);
-    add(error(odom_from_base, filter.pose()), filter.covariance(), innovation.nis(), scan, sums);
-    if (scan == experiment.pose_set_at) filter = told(Eigen::Vector3d(0.2, 0.1, 0.05).cwiseAbs2().asDiagonal());
-    if (scan == experiment.pose_set_at || scan % experiment.scans_per_reference == 0) {
-      reference = current;
-      filter.clone(current.variance);
+    const bool pose_set = scan == experiment.pose_set_at;
+    const bool new_reference = pose_set || scan % experiment.scans_per_reference == 0;
+    double nis = 0.0;
+    for (std::size_t i = 0; i < (new_reference ? references.size() : 1); ++i) {
+      Displacement z = room.match(references[i], current, random);
+      ASSERT_EQ(z.dimension(), experiment.world.directions);
+      z.clone = i;
+      const Innovation innovation = filter->innovation(z);
+      filter->update(z, innovation);
+      nis = innovation.nis();  // of the last, which has the others' news behind it
     }
+    add(error(odom_from_base, filter->pose()), filter->covariance(), nis, scan, sums);
+    if (pose_set) {
+      filter = told(Eigen::Vector3d(0.2, 0.1, 0.05).cwiseAbs2().asDiagonal());
+      references.clear();
+    }
+    if (!new_reference) continue;
+    filter->clone(current.variance);
+    references.push_front(current);
+    if (references.size() <= experiment.references) continue;
+    references.pop_back();
+    if (filter->clones() > references.size()) filter->forget(references.size());
   }
 }
 
@@ -166,9 +179,11 @@ INSTANTIATE_TEST_SUITE_P(Worlds, Consistency,
 
 /// A pose that is set drops the clone and all that is correlated with it. The scan after becomes the reference.
 TEST(PoseSetInMidRun, LeavesErrorsAndInnovationsConsistent) {
-  for (const int scans_per_reference : {1, 5}) {
-    SCOPED_TRACE(scans_per_reference);
+  for (const auto& [method, scans_per_reference] : {std::pair("sckf", 1), {"sckf", 5}, {"sckf_multi", 5}}) {
+    SCOPED_TRACE(std::string(method) + ", " + std::to_string(scans_per_reference));
     Experiment experiment;
+    experiment.method = method;
+    experiment.references = experiment.method == "sckf_multi" ? 4 : 1;
     experiment.scans_per_reference = scans_per_reference;
     experiment.pose_set_at = 23;
     const Statistics sums = simulate(experiment);
@@ -177,18 +192,54 @@ TEST(PoseSetInMidRun, LeavesErrorsAndInnovationsConsistent) {
   }
 }
 
-TEST(HardlyKnownYaw, StaysHardlyKnown) {
+class SeveralReferences : public ::testing::TestWithParam<std::tuple<World, int>> {};
+
+TEST_P(SeveralReferences, AreConsistentToo) {
+  Experiment experiment;
+  experiment.method = "sckf_multi";
+  experiment.world = std::get<0>(GetParam());
+  experiment.references = 4;
+  experiment.scans_per_reference = std::get<1>(GetParam());
+  const Statistics sums = simulate(experiment);
+  expectInBand(sums.nees, 3, "NEES");
+  expectInBand(sums.nis, experiment.world.directions, "NIS");
+}
+
+INSTANTIATE_TEST_SUITE_P(Worlds, SeveralReferences,
+                         ::testing::Combine(::testing::Values(kRoom, kCorridor), ::testing::Values(1, 5)),
+                         [](const auto& info) {
+                           return std::string(std::get<0>(info.param).name) + "References" +
+                                  std::to_string(std::get<1>(info.param));
+                         });
+
+TEST(SeveralReferences, AreMoreAccurateThanOne) {
+  Experiment experiment;
+  const Statistics one = simulate(experiment);
+  experiment.method = "sckf_multi";
+  experiment.references = 4;
+  const Statistics several = simulate(experiment);
+  EXPECT_LT(several.rms(kScans), 0.9 * one.rms(kScans));
+}
+
+class HardlyKnownYaw : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(HardlyKnownYaw, StaysHardlyKnown) {
   // Displacements say nothing about the absolute yaw, however much the estimate moves while a reference is kept.
   Experiment experiment;
+  experiment.method = GetParam();
+  experiment.references = experiment.method == "sckf_multi" ? 4 : 1;
   experiment.scans_per_reference = 10;
   experiment.start_yaw_std = 0.3;
   expectInBand(simulate(experiment).yaw_nees, 1, "NEES of the yaw");
 }
 
+INSTANTIATE_TEST_SUITE_P(Methods, HardlyKnownYaw, ::testing::Values("sckf", "sckf_multi"),
+                         [](const auto& info) { return std::string(info.param); });
+
 TEST(WithoutCorrelations, IsFarTooPessimistic) {
   Experiment experiment;
   const Statistics with = simulate(experiment);
-  experiment.correlations = Correlations::kIgnored;
+  experiment.method = "sckf_nc";
   const Statistics without = simulate(experiment);
   for (const int scan : kCheckedScans) {
     EXPECT_LT(without.nees[scan] / kRuns, 0.6 * Band(3).low) << "scan " << scan << ": pessimistic, by far";

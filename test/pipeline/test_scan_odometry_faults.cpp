@@ -380,8 +380,9 @@ TEST(ScanOdometryFaults, OnACarpetTheSlipIsSeenAndCounted) {
   EXPECT_GE(slips_on_the_carpet, 15);
   EXPECT_EQ(driven.count(ScanOutcome::kSlip), static_cast<std::size_t>(slips_on_the_carpet));
 
-  // Without: the wheels are believed, and more than half a metre is lost.
+  // Without: the wheels are believed, and more than half a metre is lost, but for older references to find it again.
   PipelineOptions believing = trustingTheWheels();
+  believing.method = "sckf";
   believing.gate.trust_scans_on_slip = false;
   Driven misled(drive, believing);
   misled.odometry(0);

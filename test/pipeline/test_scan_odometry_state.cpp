@@ -263,7 +263,7 @@ TEST(ScanOdometryState, AnotherMethodNeedsANewEstimate) {
     pipeline.setOptions(options);
     FAIL() << "not refused";
   } catch (const std::invalid_argument& refusal) {
-    EXPECT_THAT(refusal.what(), testing::HasSubstr("\"dead_reckoning\": expected \"sckf\""));
+    EXPECT_THAT(refusal.what(), testing::HasSubstr("\"dead_reckoning\": expected \"sckf_multi\""));
   }
   EXPECT_NE(pipeline.options().scan.min_points, 7);
 }

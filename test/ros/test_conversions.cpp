@@ -261,6 +261,7 @@ TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
   report.innovation->covariance = Eigen::Matrix2d::Identity();
   report.nis_bound = 13.8;
   report.reference_stamp = std::chrono::seconds(4);
+  report.older_references = 2;
   report.match_time = 0.001;
   report.total_time = 0.002;
   const auto status = toStatus(report, "sckf", "odom", ros::Time(7.5));
@@ -277,6 +278,7 @@ TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
   EXPECT_NEAR(status.nis, 5.0, 1e-12);
   EXPECT_EQ(status.nis_bound, 13.8);
   EXPECT_EQ(status.reference_age, 3.0);
+  EXPECT_EQ(status.older_references, 2);
   EXPECT_EQ(status.match_time, 0.001);
   EXPECT_EQ(status.total_time, 0.002);
   EXPECT_NEAR(status.latency, 0.5, 1e-9);

@@ -131,7 +131,7 @@ TEST(Parameters, ABadValueIsRefusedByNameValueAndAllowedRange) {
   EXPECT_TRUE(contains(refusal("path_distance: -1\n"), "path_distance = -1: a number of at least 0 m"));
   EXPECT_TRUE(contains(refusal("time_jump: 0\n"), "time_jump = 0: a number above 0 s"));
   EXPECT_TRUE(contains(refusal("queue_size: -1\n"), "queue_size = -1: a whole number in [1, 1e+06] messages"));
-  EXPECT_TRUE(contains(refusal("method: icp\n"), "method = \"icp\": one of \"sckf\""));
+  EXPECT_TRUE(contains(refusal("method: icp\n"), "method = \"icp\": one of \"sckf_multi\" \"sckf\""));
 }
 
 TEST(Parameters, EveryBadValueIsNamedAtOnce) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 
 #include "sckf_odometry/core/se2.h"
 
@@ -14,6 +15,7 @@ struct Displacement {
   using MatrixD3 = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 3, 3>;
   using MatrixDD = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>;
 
+  std::size_t clone = 0;                              ///< which clone is the reference: 0 the newest
   SE2 reference_from_current;                         ///< pose of the current base_link in the reference base_link
   MatrixD3 observable = Eigen::Matrix3d::Identity();  ///< V_oᵀ, d × 3: the combinations of (x, y, yaw) that are seen
   Eigen::MatrixXd J_reference;                        ///< d × M_k, by the ranges of the reference scan [1/m]

@@ -38,12 +38,20 @@ class FusionMethod {
   /// The wheels slipped: what they said since the last update may be wrong by this covariance (in base_link) more.
   virtual void distrustWheels(const Eigen::Matrix3d& covariance) { propagate({SE2(), covariance}); }
 
-  virtual DisplacementPrediction predictedDisplacement() const = 0;
+  virtual DisplacementPrediction predictedDisplacement() const = 0;  ///< from the newest clone
 
   /// Residual, its covariance and the gain that update() would use: for gating. The displacement must see at least
   /// one direction (d ≥ 1), and have J_reference with as many columns as the last clone() had ranges.
   virtual Innovation innovation(const Displacement& displacement) const = 0;
   virtual void update(const Displacement& displacement, const Innovation& innovation) = 0;
+
+  /// The methods of the paper have one clone, which clone() replaces. Others have several, the newest number 0, and any
+  /// of them can be the reference of a displacement.
+  virtual std::size_t clones() const { return 1; }
+  virtual DisplacementPrediction predictedDisplacementFrom(std::size_t /*clone*/) const {
+    return predictedDisplacement();
+  }
+  virtual void forget(std::size_t /*clone*/) {}
 
   /// The present scan becomes the reference. range_variances (M): the diagonal of its R [m²].
   virtual void clone(const Eigen::VectorXd& range_variances) = 0;

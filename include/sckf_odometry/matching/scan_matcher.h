@@ -56,9 +56,11 @@ class ScanMatcher {
   Match match(const PreparedScan& reference, const PreparedScan& current,
               const DisplacementPrediction& prediction) const;
 
- private:
-  bool ranAway(const SE2& estimated, const SE2& aligned) const;
+  /// The same where the prediction is good to a few centimetres: the alignment begins there, and nowhere else.
+  Match matchNear(const PreparedScan& reference, const PreparedScan& current,
+                  const DisplacementPrediction& prediction) const;
 
+ private:
   MatcherOptions options_;
 };
 

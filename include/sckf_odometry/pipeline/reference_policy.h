@@ -9,10 +9,19 @@ namespace sckf {
 /// while the next scan, as far away from this one as this one from the last, will probably be within the limits.
 /// Zero distances make every scan a reference, which is the algorithm of the paper.
 struct ReferenceOptions {
-  double kf_dist_linear = 1.0;   ///< [m] largest way from the reference to a scan that is compared with it
-  double kf_dist_angular = 0.7;  ///< [rad] largest rotation
+  double kf_dist_linear = 0.7;   ///< [m] largest way from the reference to a scan that is compared with it
+  double kf_dist_angular = 0.5;  ///< [rad] largest rotation
   double kf_min_overlap = 0.6;   ///< a smaller share of points with a partner makes the scan the new reference
   int kf_max_failures = 2;       ///< so does this many scans in a row that gave no displacement
+
+  // A scan that becomes a reference is compared with older ones too, where the method keeps more than one.
+  int kept = 16;                        ///< references, the newest among them
+  int older_compared = 2;               ///< so many older ones: the one before the newest, then the nearest …
+  double older_dist_linear = 3.0;       ///< [m] … not farther away than this …
+  double older_dist_angular = 1.5;      ///< [rad] … nor turned more …
+  double older_min_overlap = 0.3;       ///< … nor with a smaller share of points with a partner
+  double older_std_translation = 0.03;  ///< [m] what the estimate may be off from an older reference, beyond its
+  double older_std_yaw = 0.01;          ///< [rad] … covariance, times the root of the references in between
 };
 
 class ReferencePolicy {

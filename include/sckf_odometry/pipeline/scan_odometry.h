@@ -13,6 +13,7 @@
 #include "sckf_odometry/matching/scan_matcher.h"
 #include "sckf_odometry/pipeline/odometry_buffer.h"
 #include "sckf_odometry/pipeline/reference_policy.h"
+#include "sckf_odometry/pipeline/reference_scans.h"
 #include "sckf_odometry/pipeline/scan_report.h"
 #include "sckf_odometry/pipeline/twist_window.h"
 #include "sckf_odometry/pipeline/waiting_scans.h"
@@ -30,7 +31,7 @@ struct GateOptions {
 };
 
 struct PipelineOptions {
-  std::string method = "sckf";  ///< one of fusionMethodNames()
+  std::string method = "sckf_multi";  ///< one of fusionMethodNames()
   OdometryNoise odometry_noise;
   bool prefer_twist_covariance = false;  ///< use the twist covariance of the odometry message where it is sensible
   ScanOptions scan;
@@ -90,6 +91,8 @@ class ScanOdometry {
   ScanReport take(const WaitingScans::Entry& waiting);
   void compareWithReference(ScanReport& report);
   bool fuse(ScanReport& report);
+  void compareWithOlderReferences(ScanReport& report);
+  double gate(const Displacement& displacement) const;  ///< a larger innovation, normalised and squared, contradicts
   bool looksLikeSlip(const Match& match) const;
   void propagateTo(Stamp stamp);
   void carryOn();
@@ -118,7 +121,7 @@ class ScanOdometry {
   std::unique_ptr<FusionMethod> filter_;  // at filter_stamp_; null before the first odometry
   Stamp filter_stamp_{0};
   bool wheels_known_ = true;  // since the last scan
-  std::shared_ptr<const PreparedScan> reference_;
+  ReferenceScans references_;
   std::optional<DeadReckoning> carried_on_;  // the estimate, from filter_stamp_ on by the wheels to carried_on_stamp_
   Stamp carried_on_stamp_{0};
 };

@@ -42,6 +42,7 @@ struct ScanReport {
   double nis_bound = 0.0;                    ///< what contradicts the prediction has a larger nis()
   Stamp reference_stamp{0};                  ///< of the scan that it was compared with
   bool new_reference = false;                ///< it became the reference
+  int older_references = 0;                  ///< so many more references corrected the estimate
   bool wheels_known = true;                  ///< false: wheels did not tell all of the motion since the scan before
   double match_time = 0.0;                   ///< [s] spent on the comparison with the reference …
   double total_time = 0.0;                   ///< [s] … and on the scan on the whole

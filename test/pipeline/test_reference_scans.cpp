@@ -1,0 +1,112 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pipeline/simulated_drive.h"
+#include "sckf_odometry/core/multi_clone_filter.h"
+#include "sckf_odometry/core/stochastic_cloning_filter.h"
+#include "sckf_odometry/pipeline/reference_scans.h"
+
+namespace sckf::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+const Eigen::Matrix3d kSmall = 1e-6 * Eigen::Matrix3d::Identity();
+
+/// References along the way of a filter, the last at its pose.
+struct Way {
+  explicit Way(FusionMethod& f, int kept = 16) : filter(f), kept(kept) {}
+
+  void add(const SE2& step) {
+    filter.propagate({step, kSmall});
+    filter.clone(Eigen::VectorXd::Constant(1, 1e-4));
+    scans.add(std::make_shared<PreparedScan>(), kept, filter);
+  }
+
+  FusionMethod& filter;
+  int kept;
+  ReferenceScans scans;
+};
+
+ReferenceOptions limits(int compared) {
+  ReferenceOptions options;
+  options.older_compared = compared;
+  options.older_dist_linear = 3.0;
+  options.older_dist_angular = 1.5;
+  return options;
+}
+
+TEST(ReferenceScans, TheOneBeforeComesFirstThenTheNearest) {
+  MultiCloneFilter filter(SE2(), kSmall);
+  Way way(filter);
+  for (int i = 0; i < 6; ++i) way.add(SE2(1.0, 0.0, 0.0));  // at 1 … 6
+  filter.propagate({SE2(-3.8, 0.0, 0.0), kSmall});          // back to 2.2: clones 0 … 5 are at 6 … 1
+  EXPECT_THAT(way.scans.worthComparing(filter, limits(3)), ElementsAre(1U, 4U, 3U)) << "5 is 2.8 m away, then 2 and 3";
+  EXPECT_THAT(way.scans.worthComparing(filter, limits(1)), ElementsAre(1U));
+  EXPECT_THAT(way.scans.worthComparing(filter, limits(0)), IsEmpty());
+}
+
+TEST(ReferenceScans, WhatIsFarOrTurnedIsNotCompared) {
+  MultiCloneFilter filter(SE2(), kSmall);
+  Way way(filter);
+  for (int i = 0; i < 3; ++i) way.add(SE2(2.0, 0.0, 0.0));
+  EXPECT_THAT(way.scans.worthComparing(filter, limits(9)), ElementsAre(1U)) << "the other is 4 m away";
+  filter.propagate({SE2(0.0, 0.0, 1.6), kSmall});
+  EXPECT_THAT(way.scans.worthComparing(filter, limits(9)), IsEmpty()) << "turned by more than 1.5 rad";
+}
+
+TEST(ReferenceScans, ForgetsTheOldest) {
+  MultiCloneFilter filter(SE2(), kSmall);
+  Way way(filter, 3);
+  for (int i = 0; i < 10; ++i) {
+    way.add(SE2(0.1, 0.0, 0.0));
+    EXPECT_EQ(filter.clones(), static_cast<std::size_t>(std::min(i + 1, 3)));
+  }
+  EXPECT_NEAR(filter.clonedPose(2).x, 0.8, 1e-9);
+  EXPECT_THAT(way.scans.worthComparing(filter, limits(9)), ElementsAre(1U, 2U));
+}
+
+TEST(ReferenceScans, AMethodWithOneCloneHasNoOlderOnes) {
+  StochasticCloningFilter filter(SE2(), kSmall);
+  Way way(filter);
+  for (int i = 0; i < 5; ++i) way.add(SE2(0.1, 0.0, 0.0));
+  EXPECT_THAT(way.scans.worthComparing(filter, limits(9)), IsEmpty());
+}
+
+TEST(ReferenceScans, SlackGrowsWithTheReferencesInBetween) {
+  ReferenceOptions options;
+  options.older_std_translation = 0.03;
+  options.older_std_yaw = 0.01;
+  const Eigen::Vector3d variances(4 * 9e-4, 4 * 9e-4, 4 * 1e-4);
+  EXPECT_TRUE(matricesNear(referenceSlack(3, options), Eigen::Matrix3d(variances.asDiagonal()), 1e-12));
+}
+
+/// Round after round in one room: what one reference after the other adds up to, older ones take back.
+TEST(ScanOdometry, OlderReferencesHoldTheEstimate) {
+  const SimulatedDrive drive(Wheels(), 46000);
+  double drift[2];
+  for (const bool older : {false, true}) {
+    PipelineOptions options;
+    options.method = "sckf_multi";
+    options.reference.older_compared = older ? 2 : 0;
+    Driven driven(drive, options);
+    driven.odometry(0);
+    driven.run(0, 45000);
+    int compared = 0;
+    for (const ScanReport& report : driven.reports) {
+      compared += report.older_references;
+      EXPECT_TRUE(report.new_reference || report.older_references == 0);
+    }
+    EXPECT_EQ(compared > 20, older) << compared;
+    double sum = 0.0;
+    for (const ScanReport& report : driven.reports) {
+      sum += error(report.estimate->odom_from_base, drive.truth(milliseconds(report.stamp))).head<2>().norm();
+    }
+    drift[older ? 1 : 0] = sum / static_cast<double>(driven.reports.size());
+  }
+  EXPECT_LT(drift[1], 0.8 * drift[0]) << "mean error in metres, with " << drift[1] << " and without " << drift[0];
+}
+
+}  // namespace
+}  // namespace sckf::test
