@@ -31,7 +31,7 @@ class Bytes {
   Value any() {
     Value value{};
     const std::size_t n = std::min(sizeof(Value), left_);
-    std::memcpy(&value, data_, n);
+    if (n > 0) std::memcpy(&value, data_, n);  // data_ may be null where there is nothing
     data_ += n;
     left_ -= n;
     return value;

@@ -31,7 +31,7 @@ nav_msgs::Path PathRecorder::message(const std::string& frame) const {
 std::int64_t CloudRecorder::cell(const Eigen::Vector2d& point) const {
   const auto column = static_cast<std::int32_t>(std::floor(point.x() / resolution_));
   const auto row = static_cast<std::int32_t>(std::floor(point.y() / resolution_));
-  return (static_cast<std::int64_t>(column) << 32) | static_cast<std::uint32_t>(row);
+  return column * (std::int64_t{1} << 32) + static_cast<std::uint32_t>(row);
 }
 
 void CloudRecorder::add(const SE2& odom_from_base, const std::vector<Eigen::Vector2d>& points_in_base) {
