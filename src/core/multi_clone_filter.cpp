@@ -66,7 +66,7 @@ SE2 MultiCloneFilter::inOdom(const SE2& pose) const { return {origin_.x() + pose
 
 Matrix3d MultiCloneFilter::covariance() const {
   const Matrix3d T = additive(poses_.front());
-  return T * P_.topLeftCorner<3, 3>() * T.transpose();
+  return symmetric(T * P_.topLeftCorner<3, 3>() * T.transpose());
 }
 
 void MultiCloneFilter::propagate(const OdometryIncrement& increment) {
