@@ -26,7 +26,7 @@ class Install(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         # catkin fixes the prefix when it configures; scripts/setup puts it into the build.
-        cls.prefix = os.path.join(os.path.realpath(BUILD), 'install')
+        cls.prefix = os.path.join(os.path.realpath(BUILD), '.install')
         with open(os.path.join(BUILD, 'CMakeCache.txt'), encoding='utf-8') as file:
             cache = file.read()
         if 'CMAKE_INSTALL_PREFIX:PATH=%s\n' % cls.prefix not in cache:

@@ -250,7 +250,7 @@ class Services(unittest.TestCase):
         self.assertGreater(len(updated), 0.7 * len(statuses))
         for message in updated:
             self.assertTrue(message.accepted)
-            self.assertEqual((message.method, message.header.frame_id, message.dimension), ('sckf', 'odom', 3))
+            self.assertEqual((message.method, message.header.frame_id, message.dimension), ('sckf_multi', 'odom', 3))
             self.assertGreater(message.pairs, 100)
             self.assertGreater(message.overlap, 0.3)
             self.assertLess(message.nis, message.nis_bound)
