@@ -261,8 +261,7 @@ class Driver {
       ++reported_;
       if (report.estimate) requireSound(*report.estimate);
       if (report.innovation) require(std::isfinite(report.innovation->nis()), "the NIS is finite");
-      const bool used = report.outcome == ScanOutcome::kReference || report.outcome == ScanOutcome::kUpdated ||
-                        report.outcome == ScanOutcome::kSlip;
+      const bool used = report.outcome == ScanOutcome::kReference || wasUsed(report.outcome);
       require(used == report.reason.empty(), "a scan that is not used has a reason: " + report.reason);
     }
     if (const auto latest = pipeline_.latest()) requireSound(*latest);

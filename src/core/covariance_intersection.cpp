@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <boost/math/tools/minima.hpp>
 
+#include "sckf_odometry/core/covariance.h"
+
 namespace sckf {
 
 namespace {
@@ -23,9 +25,8 @@ CovarianceIntersection intersectCovariances(const Eigen::Matrix3d& P,
   result.omega = omega;
   result.gain = S.llt().solve(P_Ht.transpose()).transpose();
   const Eigen::Matrix3d A = Eigen::Matrix3d::Identity() - result.gain * H;
-  const Eigen::Matrix3d joseph =
-      A * P_inflated * A.transpose() + result.gain * (R / (1.0 - omega)) * result.gain.transpose();
-  result.covariance = 0.5 * (joseph + joseph.transpose());
+  result.covariance =
+      symmetric(A * P_inflated * A.transpose() + result.gain * (R / (1.0 - omega)) * result.gain.transpose());
   return result;
 }
 

@@ -2,6 +2,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "sckf_odometry/core/covariance.h"
+
 namespace sckf {
 
 DeadReckoning::DeadReckoning(const SE2& odom_from_base, const Eigen::Matrix3d& covariance)
@@ -12,8 +14,7 @@ void DeadReckoning::propagate(const OdometryIncrement& increment) {
     Eigen::Matrix3d F;
     Eigen::Matrix3d G;
     pose = compose(pose, increment.before_from_after, &F, &G);
-    P = F * P * F.transpose() + G * increment.covariance * G.transpose();
-    P = (0.5 * (P + P.transpose())).eval();
+    P = symmetric(F * P * F.transpose() + G * increment.covariance * G.transpose());
   };
   move(pose_, covariance_);
   move(since_clone_.reference_from_current, since_clone_.covariance);

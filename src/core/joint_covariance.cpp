@@ -2,15 +2,11 @@
 
 #include <Eigen/Cholesky>
 
+#include "sckf_odometry/core/covariance.h"
+
 namespace sckf {
 
 namespace {
-
-/// Rounding must not make a covariance drift from symmetry.
-template <typename Matrix>
-Matrix symmetric(const Matrix& P) {
-  return 0.5 * (P + P.transpose());
-}
 
 /// [H_k H I], d × (6 + d): the innovation's Jacobian by [X̃_k; X̃; J^k z̃_k].
 Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 9> projectedJacobian(const Innovation& innovation) {
@@ -45,7 +41,7 @@ JointCovariance::JointCovariance(const Eigen::Matrix3d& pose_covariance)
       R_k_(Eigen::VectorXd::Zero(0)) {}
 
 void JointCovariance::propagate(const Eigen::Matrix3d& F, const Eigen::Matrix3d& Q) {
-  P_XX_ = symmetric<Eigen::Matrix3d>(F * P_XX_ * F.transpose() + Q);
+  P_XX_ = symmetric(F * P_XX_ * F.transpose() + Q);
   P_kX_ = P_kX_ * F.transpose();
   Phi_ = F * Phi_;
 }
@@ -66,7 +62,7 @@ void JointCovariance::weigh(const Eigen::MatrixXd& J_reference, Innovation& inno
   const Projected P = project(J_reference);
   const auto H = projectedJacobian(innovation);
   const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 9, 3> P_Ht = P * H.transpose();
-  innovation.covariance = symmetric<Innovation::MatrixDD>(H * P_Ht + innovation.noise);                // (19)
+  innovation.covariance = symmetric(H * P_Ht + innovation.noise);                // (19)
   innovation.gain = innovation.covariance.llt().solve(P_Ht.middleRows<3>(3).transpose()).transpose();  // (21)
 }
 
@@ -83,7 +79,7 @@ void JointCovariance::update(const Eigen::MatrixXd& J_reference, const Innovatio
   const Eigen::MatrixXd B_z = P_kz_.transpose() * innovation.H_clone.transpose() +
                               Pi_.transpose() * (Phi_.transpose() * innovation.H_pose.transpose()) +
                               R_k_.asDiagonal() * J_reference.transpose();
-  P_XX_ = symmetric<Eigen::Matrix3d>(A * P * A.transpose() + K * innovation.noise * K.transpose());  // (23)
+  P_XX_ = symmetric(A * P * A.transpose() + K * innovation.noise * K.transpose());  // (23)
   P_kX_ = P.topRows<3>() * A.transpose();
   Pi_ = (Phi_ * Pi_ + U * P_kz_ - K * B_z.transpose()).eval();
   Phi_.setIdentity();

@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "sckf_odometry/core/covariance.h"
+
 namespace sckf {
 
 namespace {
@@ -37,8 +39,6 @@ SE2 exponential(const Eigen::Vector3d& xi) {
   const Eigen::Vector2d t = chord * (SE2(0.0, 0.0, half).rotation() * xi.head<2>());
   return {t.x(), t.y(), theta};
 }
-
-MatrixXd symmetric(const MatrixXd& P) { return 0.5 * (P + P.transpose()); }
 
 /// A matrix with rows of its own for a clone of the first pose, behind that pose.
 MatrixXd withClonedRows(const MatrixXd& A) {

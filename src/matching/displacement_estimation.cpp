@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sckf_odometry/core/covariance.h"
+
 namespace sckf {
 
 namespace {
@@ -117,7 +119,7 @@ MatrixDD matchingNoise(const MatrixDD& range_covariance, const MatrixDD& seen_co
   const MatrixDD L = range.matrixL();
   MatrixDD whitened = range.matrixL().solve(seen_covariance);
   whitened = range.matrixL().solve(whitened.transpose()).eval();
-  const Eigen::SelfAdjointEigenSolver<MatrixDD> eigen(0.5 * (whitened + whitened.transpose()));
+  const Eigen::SelfAdjointEigenSolver<MatrixDD> eigen(symmetric(whitened));
   const Eigen::VectorXd excess = (eigen.eigenvalues().array() - 1.0 - std::sqrt(2.0 / blocks)).max(0.0);
   const MatrixDD half = L * eigen.eigenvectors();
   return half * excess.asDiagonal() * half.transpose();

@@ -16,11 +16,6 @@ namespace {
 /// So many scans beyond the time-out mean that the wheels are silent; one may have a wrong stamp.
 constexpr std::size_t kConfirmations = 3;
 
-/// Up to ±30 years, which added to a time is still a stamp.
-Stamp fromSeconds(double s) {
-  return std::chrono::duration_cast<Stamp>(std::chrono::duration<double>(std::clamp(s, -1e9, 1e9)));
-}
-
 using Clock = std::chrono::steady_clock;
 double secondsSince(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
@@ -84,7 +79,7 @@ OdometryBuffer::Insertion ScanOdometry::addOdometry(const OdometrySample& sample
   carryOn();  // first: what the filter takes is forgotten
   // Without scans the filter follows the wheels at a distance, so that the buffer stays small; from sample to sample,
   // so that it makes no difference when the samples arrived.
-  const Stamp too_old = odometry_.newest() - fromSeconds(options_.max_scan_delay);
+  const Stamp too_old = odometry_.newest() - toDuration(options_.max_scan_delay);
   if (too_old > filter_stamp_) {
     const Stamp last = odometry_.lastUpTo(too_old);
     if (last > filter_stamp_) propagateTo(last);
@@ -127,7 +122,8 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   ScanReport report;
   report.stamp = stamp;
   const Stamp before = filter_stamp_;
-  const DisplacementPrediction at_before = filter_->predictedDisplacement();
+  std::optional<DisplacementPrediction> at_before;  // asked for where wheels do not tell the twist
+  if (odometry_.endsBridged()) at_before = filter_->predictedDisplacement();
   propagateTo(stamp);  // (9)-(14)
   report.wheels_known = std::exchange(wheels_known_, true);
   report.scan = prepareScan(waiting.scan, waiting.base_from_laser, options_.scan, &report.reason);
@@ -138,7 +134,7 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   } else {
     compareWithReference(report);  // (16)-(23)
   }
-  if (odometry_.endsBridged()) followScans(before, at_before, report);
+  if (at_before) followScans(before, *at_before, report);
   if (report.new_reference) {
     compareWithOlderReferences(report);
     filter_->clone(report.scan->rangeVariances());  // (24)-(27)
@@ -243,7 +239,7 @@ void ScanOdometry::setOptions(const PipelineOptions& options) {
 }
 
 void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp) {
-  filter_ = makeFusionMethod(options_.method, odom_from_base, 0.5 * (covariance + covariance.transpose()));  // (6)(7)
+  filter_ = makeFusionMethod(options_.method, odom_from_base, symmetric(covariance));  // (6)(7)
   filter_stamp_ = stamp;
   odometry_.discardBefore(stamp);
   wheels_known_ = true;
@@ -274,13 +270,13 @@ void ScanOdometry::carryOn() {
 }
 
 bool ScanOdometry::onScansAlone() const {
-  const Stamp timeout = fromSeconds(options_.odometry_timeout);
+  const Stamp timeout = toDuration(options_.odometry_timeout);
   const bool alone = odometry_.endsBridged() && (!wheels_heard_ || odometry_.newest() > *wheels_heard_ + timeout);
   return alone || (!waiting_.empty() && wheelsAreSilent());
 }
 
 bool ScanOdometry::wheelsAreSilent() const {
-  const Stamp timeout = fromSeconds(options_.odometry_timeout);
+  const Stamp timeout = toDuration(options_.odometry_timeout);
   const bool alone = odometry_.endsBridged();
   const Stamp heard = wheels_heard_.value_or(alone ? odometry_.oldest() - timeout : waiting_.oldest());
   if (alone && waiting_.oldest() > heard + timeout && waiting_.oldest() <= odometry_.newest() + timeout) return true;
@@ -313,8 +309,7 @@ void ScanOdometry::followScans(Stamp since, const DisplacementPrediction& at_sin
   const SE2 motion = between(at_since.reference_from_current, now.reference_from_current, &A, &B);
   twist_.add({motion, A * at_since.covariance * A.transpose() + B * now.covariance * B.transpose()},
              seconds(report.stamp - since));
-  const bool used = report.outcome == ScanOutcome::kUpdated || report.outcome == ScanOutcome::kSlip;
-  if (used && report.match.displacement->dimension() == 3) motion_known_ = report.stamp;
+  if (wasUsed(report.outcome) && report.match.displacement->dimension() == 3) motion_known_ = report.stamp;
 }
 
 MotionGuess ScanOdometry::guess() const { return {twist_.twist().mean, motion_known_}; }

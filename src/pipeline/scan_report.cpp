@@ -24,6 +24,8 @@ std::string toString(ScanOutcome outcome) {
   return "unknown";
 }
 
+bool wasUsed(ScanOutcome outcome) { return outcome == ScanOutcome::kUpdated || outcome == ScanOutcome::kSlip; }
+
 ScanReport notUsed(Stamp stamp, ScanOutcome outcome, const std::string& reason) {
   ScanReport report;
   report.stamp = stamp;

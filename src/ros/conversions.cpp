@@ -228,7 +228,7 @@ sckf_odometry::Status toStatus(const ScanReport& report, const std::string& meth
   status.method = method;
   status.outcome = toString(report.outcome);
   status.reason = report.reason;
-  status.accepted = report.outcome == ScanOutcome::kUpdated || report.outcome == ScanOutcome::kSlip;
+  status.accepted = wasUsed(report.outcome);
   status.new_reference = report.new_reference;
   status.older_references = static_cast<std::uint8_t>(std::min(report.older_references, 255));
   status.wheels_known = report.wheels_known;

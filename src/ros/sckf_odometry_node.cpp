@@ -16,8 +16,6 @@ namespace {
 constexpr char kLogger[] = "sckf_odometry";
 constexpr uint32_t kQueue = 1000;  // at fast replay many messages leave in one go
 
-Stamp toDuration(double seconds) { return std::chrono::duration_cast<Stamp>(std::chrono::duration<double>(seconds)); }
-
 /// With odometry on TF, base_frame has a parent there already.
 NodeOptions withOdometryOnTf(NodeOptions options) {
   if (!options.use_tf_odometry) return options;

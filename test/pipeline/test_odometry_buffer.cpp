@@ -320,11 +320,5 @@ TEST(OdometryBuffer, RefusesStampsThatAreNoTimes) {
   EXPECT_EQ(buffer.insert(sample(std::chrono::seconds(4294967295), SE2())), Insertion::kAhead);
 }
 
-TEST(OdometryBuffer, ClearedItBeginsAnew) {
-  OdometryBuffer buffer = straight({0, 20});
-  buffer.clear();
-  EXPECT_TRUE(buffer.empty());
-}
-
 }  // namespace
 }  // namespace sckf

@@ -36,19 +36,25 @@ def walls():
 
 
 class Mount:
-    """Pose of the laser in base_link: translation, then rotation about z, then half a turn about x if upside down."""
+    """Pose of the laser in base_link: translation, then rotation about z, then about y, then half a turn about x if
+    upside down."""
 
-    def __init__(self, x=0.0, y=0.0, z=0.3, yaw=0.0, upside_down=False, frame='laser'):
-        self.x, self.y, self.z, self.yaw, self.upside_down, self.frame = x, y, z, yaw, upside_down, frame
+    def __init__(self, x=0.0, y=0.0, z=0.3, yaw=0.0, pitch=0.0, upside_down=False, frame='laser'):
+        self.x, self.y, self.z, self.yaw, self.pitch = x, y, z, yaw, pitch
+        self.upside_down, self.frame = upside_down, frame
 
-    def bearings(self, angles):
-        """Directions in base_link of beams at these angles in the laser's plane."""
-        return self.yaw + (-angles if self.upside_down else angles)
+    def beams(self, angles):
+        """Of beams at these angles in the laser's plane: the bearings in base_link, and the share of their length that
+        is horizontal."""
+        x, y = np.cos(angles) * math.cos(self.pitch), np.sin(-angles if self.upside_down else angles)
+        return self.yaw + np.arctan2(y, x), np.hypot(x, y)
 
     def quaternion(self):
-        """x, y, z, w of Rz(yaw), times Rx(pi) if upside down."""
+        """x, y, z, w of Rz(yaw) Ry(pitch), times Rx(pi) if upside down."""
         c, s = math.cos(self.yaw / 2), math.sin(self.yaw / 2)
-        return (c, s, 0.0, 0.0) if self.upside_down else (0.0, 0.0, s, c)
+        cp, sp = math.cos(self.pitch / 2), math.sin(self.pitch / 2)
+        x, y, z, w = -s * sp, c * sp, s * cp, c * cp
+        return (w, z, -y, -x) if self.upside_down else (x, y, z, w)
 
 
 def truth(t):
@@ -121,7 +127,8 @@ def scan_message(stamp, pose, mount, segments, rng, beams=360, noise=0.01):
     message.range_min, message.range_max = 0.05, 30.0
     angles = message.angle_min + np.arange(beams) * message.angle_increment
     laser = compose(pose, np.array([mount.x, mount.y, 0.0]))
-    ranges = cast(laser[:2], pose[2] + mount.bearings(angles), segments)
+    bearings, horizontal = mount.beams(angles)
+    ranges = cast(laser[:2], pose[2] + bearings, segments) / horizontal
     message.ranges = (ranges + rng.normal(size=beams) * noise).astype(np.float32).tolist()
     return message
 

@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 
+#include "sckf_odometry/core/covariance.h"
+
 namespace sckf {
 
 /// The covariance of X = X_k ⊕ D, where D, the displacement since the clone X_k, comes from measurements that share
@@ -71,8 +73,7 @@ class DisplacementCovariance {
   /// P of X (33): Φ P_k Φᵀ + Γ R Γᵀ + C + Cᵀ with C = Φ P_{X_k z_k} Lᵀ Γᵀ.
   Square covariance(const Square& Phi, const Square& Gamma) const {
     const Square C = Phi * (P_kz_ * L_.transpose()) * Gamma.transpose();
-    const Square P = Phi * P_k_ * Phi.transpose() + Gamma * displacement() * Gamma.transpose() + C + C.transpose();
-    return 0.5 * (P + P.transpose());
+    return symmetric(Phi * P_k_ * Phi.transpose() + Gamma * displacement() * Gamma.transpose() + C + C.transpose());
   }
 
   /// Of D̃.

@@ -1,6 +1,7 @@
 // A planar laser scan as a driver delivers it, without any middleware's type.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <vector>
 
@@ -10,6 +11,11 @@ namespace sckf {
 using Stamp = std::chrono::nanoseconds;
 
 inline double seconds(Stamp duration) { return std::chrono::duration<double>(duration).count(); }
+
+/// Up to ±30 years, which added to a time is still a stamp.
+inline Stamp toDuration(double seconds) {
+  return std::chrono::duration_cast<Stamp>(std::chrono::duration<double>(std::clamp(seconds, -1e9, 1e9)));
+}
 
 /// Beam i looks along angle_min + i · angle_increment in the plane of the laser, counter-clockwise about its z axis.
 /// A range that is not finite or not within [range_min, range_max) is "no reading" (REP-117; the largest range itself

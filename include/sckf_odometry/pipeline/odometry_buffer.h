@@ -73,7 +73,6 @@ class OdometryBuffer {
 
   /// Forgets what lies before the sample that brackets the instant.
   void discardBefore(Stamp stamp);
-  void clear() { *this = OdometryBuffer(limits_, timeout_); }
 
  private:
   struct Entry : OdometrySample {

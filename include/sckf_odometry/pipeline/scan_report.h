@@ -31,6 +31,9 @@ enum class ScanOutcome {
 };
 std::string toString(ScanOutcome outcome);
 
+/// Its displacement corrected the estimate.
+bool wasUsed(ScanOutcome outcome);
+
 struct ScanReport {
   Stamp stamp{0};
   ScanOutcome outcome = ScanOutcome::kReference;

@@ -20,7 +20,7 @@ class StampGuard {
 
   /// jump: [s] a stamp that goes back by more, or ahead by more while it is ahead of the clock too, is doubtful; so is
   /// one that goes ahead by ten times as much, unless the clock says the same.
-  explicit StampGuard(double jump) : jump_(std::chrono::duration_cast<Stamp>(std::chrono::duration<double>(jump))) {}
+  explicit StampGuard(double jump) : jump_(toDuration(jump)) {}
 
   struct Admission {
     std::vector<Message> passed;  ///< in the order in which they came
