@@ -16,11 +16,11 @@ const std::vector<std::string>& fusionMethodNames() {
 }
 
 std::unique_ptr<FusionMethod> makeFusionMethod(const std::string& name, const SE2& odom_from_base,
-                                               const Eigen::Matrix3d& covariance) {
+                                               const Eigen::Matrix3d& covariance, const StateOptions& states) {
   using Filter = StochasticCloningFilter;
   if (name == "sckf") return std::make_unique<Filter>(odom_from_base, covariance, Filter::Correlations::kKept);
   if (name == "sckf_nc") return std::make_unique<Filter>(odom_from_base, covariance, Filter::Correlations::kIgnored);
-  if (name == "sckf_multi") return std::make_unique<MultiCloneFilter>(odom_from_base, covariance);
+  if (name == "sckf_multi") return std::make_unique<MultiCloneFilter>(odom_from_base, covariance, states);
   if (name == "pseudo_absolute") return std::make_unique<PseudoAbsolute>(odom_from_base, covariance);
   if (name == "dead_reckoning") return std::make_unique<DeadReckoning>(odom_from_base, covariance);
   if (name == "displacement_only") {

@@ -62,7 +62,7 @@ void JointCovariance::weigh(const Eigen::MatrixXd& J_reference, Innovation& inno
   const Projected P = project(J_reference);
   const auto H = projectedJacobian(innovation);
   const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 9, 3> P_Ht = P * H.transpose();
-  innovation.covariance = symmetric(H * P_Ht + innovation.noise);                // (19)
+  innovation.covariance = symmetric(H * P_Ht + innovation.noise);                                      // (19)
   innovation.gain = innovation.covariance.llt().solve(P_Ht.middleRows<3>(3).transpose()).transpose();  // (21)
 }
 

@@ -2,6 +2,8 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "sckf_odometry/core/covariance.h"
 
@@ -11,162 +13,343 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::MatrixXd;
-using Index = Eigen::Index;
+using Eigen::Vector3d;
+
+constexpr double kNoBound = std::numeric_limits<double>::infinity();
+const Eigen::RowVector3d kYaw(0.0, 0.0, 1.0);
+
+/// 𝒥 p: p turned by a quarter.
+Eigen::Vector2d quarterTurn(const Eigen::Vector2d& p) { return {-p.y(), p.x()}; }
 
 /// T: the additive error X̃ = T ξ of a pose.
 Matrix3d additive(const SE2& pose) {
   Matrix3d T = Matrix3d::Identity();
-  T.topRightCorner<2, 1>() << -pose.y, pose.x;
+  T.topRightCorner<2, 1>() = quarterTurn(pose.translation());
   return T;
 }
 
 Matrix3d inverseOfAdditive(const SE2& pose) { return additive(SE2(-pose.x, -pose.y, 0.0)); }
 
-/// The first row of a clone's ξ.
-Index rowOf(std::size_t clone) { return 3 * static_cast<Index>(clone + 1); }
-
-/// K of the whole state, from the covariance of state and innovation.
-MatrixXd gain(const MatrixXd& state_with_innovation, const Innovation& innovation) {
-  return innovation.covariance.llt().solve(state_with_innovation.transpose()).transpose();
+/// ξ of a pose that is displaced with its world by d, by ξ before.
+Matrix3d adjoint(const SE2& d) {
+  Matrix3d Ad = Matrix3d::Identity();
+  Ad.topLeftCorner<2, 2>() = d.rotation();
+  Ad.topRightCorner<2, 1>() = -quarterTurn(d.translation());
+  return Ad;
 }
+
+/// Length of a chord over that of its arc of 2 half radians.
+double chord(double half) { return std::abs(half) < 1e-9 ? 1.0 : std::sin(half) / half; }
 
 /// exp(ξ): the displacement that ξ = (ρ, θ) makes along a circular arc. Without the arc, a correction of the yaw would
 /// not turn a pose far from the origin about itself.
-SE2 exponential(const Eigen::Vector3d& xi) {
-  const double theta = xi.z();
-  const double half = 0.5 * theta;
-  const double chord = std::abs(half) < 1e-9 ? 1.0 : std::sin(half) / half;
-  const Eigen::Vector2d t = chord * (SE2(0.0, 0.0, half).rotation() * xi.head<2>());
-  return {t.x(), t.y(), theta};
+SE2 exponential(const Vector3d& xi) {
+  const double half = 0.5 * xi.z();
+  const Eigen::Vector2d t = chord(half) * (SE2(0.0, 0.0, half).rotation() * xi.head<2>());
+  return {t.x(), t.y(), xi.z()};
 }
 
-/// A matrix with rows of its own for a clone of the first pose, behind that pose.
-MatrixXd withClonedRows(const MatrixXd& A) {
-  MatrixXd out(A.rows() + 3, A.cols());
-  out.topRows(3) = A.topRows(3);
-  out.bottomRows(A.rows()) = A;
-  return out;
+/// ξ with exp(ξ) = d.
+Vector3d logarithm(const SE2& d) {
+  const double yaw = wrapAngle(d.yaw);
+  Vector3d xi;
+  xi << SE2(0.0, 0.0, -0.5 * yaw).rotation() * d.translation() / chord(0.5 * yaw), yaw;
+  return xi;
 }
 
-MatrixXd withoutRows(const MatrixXd& A, Index first) {
-  MatrixXd out(A.rows() - 3, A.cols());
-  out.topRows(first) = A.topRows(first);
-  out.bottomRows(out.rows() - first) = A.bottomRows(out.rows() - first);
-  return out;
+/// A gyro or a compass knows what the wheels cannot: where they contradict it they have slipped, by about r.
+void allowForSlip(const MotionMeasurement& z, const Innovation::Vector& r, const MatrixXd& S, Matrix3d& Q) {
+  constexpr double kContradiction = 10.83;  // χ² with one degree of freedom, once in a thousand times
+  if (r.size() == 1 && r(0) * r(0) > kContradiction * S(0, 0)) Q += z.seen.transpose() * r * r.transpose() * z.seen;
 }
 
 }  // namespace
 
-MultiCloneFilter::MultiCloneFilter(const SE2& odom_from_base, const Matrix3d& covariance)
-    : origin_(odom_from_base.translation()), poses_{SE2(0.0, 0.0, odom_from_base.yaw)}, P_(covariance) {
+MultiCloneFilter::MultiCloneFilter(const SE2& odom_from_base, const Matrix3d& covariance, const StateOptions& states)
+    : options_(states), origin_(odom_from_base.translation()), pose_(0.0, 0.0, odom_from_base.yaw) {
+  pose_error_ = errors_.add(covariance);
+  if (!states.calibration_std.isZero()) {
+    calibration_error_ = errors_.add(states.calibration_std.cwiseAbs2().asDiagonal().toDenseMatrix());
+  }
+  if (states.gyro_bias_std > 0.0) {
+    gyro_bias_error_ = errors_.add(MatrixXd::Constant(1, 1, states.gyro_bias_std * states.gyro_bias_std));
+  }
   clone(Eigen::VectorXd(0));  // (6)(7)
 }
 
-SE2 MultiCloneFilter::inOdom(const SE2& pose) const { return {origin_.x() + pose.x, origin_.y() + pose.y, pose.yaw}; }
+SE2 MultiCloneFilter::inWorld(const SE2& pose) const { return {origin_.x() + pose.x, origin_.y() + pose.y, pose.yaw}; }
 
 Matrix3d MultiCloneFilter::covariance() const {
-  const Matrix3d T = additive(poses_.front());
-  return symmetric(T * P_.topLeftCorner<3, 3>() * T.transpose());
+  const Matrix3d T = additive(pose_);
+  return symmetric(T * errors_.covariance(pose_error_) * T.transpose());
+}
+
+double MultiCloneFilter::varianceOf(const std::optional<Part>& part) const {
+  return part ? errors_.covariance(*part)(0, 0) : 0.0;
+}
+
+WheelCalibration MultiCloneFilter::calibration() const {
+  if (!calibration_error_) return {};
+  return {calibration_, errors_.covariance(*calibration_error_)};
+}
+
+// ---- motion
+
+/// ∂u/∂(s, r, k)
+Matrix3d MultiCloneFilter::byCalibration(const SE2& u) {
+  Matrix3d B = Matrix3d::Zero();
+  B.topLeftCorner<2, 1>() = u.translation();
+  B.bottomRightCorner<1, 2>() << u.yaw, u.translation().norm();
+  return B;
+}
+
+OdometryIncrement MultiCloneFilter::calibrated(const OdometryIncrement& increment) const {
+  OdometryIncrement motion = increment;
+  if (!increment.by_wheels) return motion;
+  const SE2& u = increment.before_from_after;
+  motion.before_from_after = corrected(u, byCalibration(u) * calibration_);
+  return motion;
 }
 
 void MultiCloneFilter::propagate(const OdometryIncrement& increment) {
+  const OdometryIncrement motion = calibrated(increment);
   Matrix3d G;
-  poses_.front() = compose(poses_.front(), increment.before_from_after, nullptr, &G);
-  const Matrix3d W = inverseOfAdditive(poses_.front()) * G;
-  P_.topLeftCorner<3, 3>() += W * increment.covariance * W.transpose();
-  present_ = RangeNoise();
+  pose_ = compose(pose_, motion.before_from_after, nullptr, &G);  // (8)
+  const Matrix3d W = inverseOfAdditive(pose_) * G;
+  const bool calibrates = calibration_error_ && increment.by_wheels;
+  if (calibrates) errors_.move(pose_error_, W * byCalibration(increment.before_from_after), *calibration_error_);
+  if (increment.measured.empty()) {
+    errors_.disturb(pose_error_, W * increment.covariance * W.transpose());  // (9)-(14)
+  } else {
+    measureMotion(increment, W);
+  }
+  if (calibrates) forgetCalibration(increment.before_from_after.translation().norm());
+  if (present_) errors_.removeRanges(*present_);
+  present_.reset();
 }
+
+/// The wheels' noise is a part of the state while others tell of the motion.
+void MultiCloneFilter::measureMotion(const OdometryIncrement& increment, const Matrix3d& W) {
+  const Matrix3d B = increment.by_wheels ? byCalibration(increment.before_from_after) : Matrix3d::Zero().eval();
+  const Vector3d u = increment.before_from_after.vector();
+  const auto expected = [&](const Vector3d& noise) -> Vector3d { return u + B * calibration_ + noise; };
+  const auto measurement = [&](const MotionMeasurement& z, const Vector3d& noise, const std::optional<Part>& part) {
+    Measurement m;
+    m.residual = z.value - z.seen * expected(noise);
+    if (z.bias_time > 0.0) m.residual(0) -= z.bias_time * gyro_bias_;
+    if (part) m.terms.push_back({*part, z.seen});
+    if (calibration_error_) m.terms.push_back({*calibration_error_, z.seen * B});
+    if (gyro_bias_error_ && z.bias_time > 0.0) {
+      m.terms.push_back({*gyro_bias_error_, MatrixXd::Constant(1, 1, z.bias_time)});
+    }
+    m.noise = z.noise;
+    return m;
+  };
+
+  Matrix3d Q = increment.covariance;
+  for (const MotionMeasurement& z : increment.measured) {
+    const Measurement m = measurement(z, Vector3d::Zero(), std::nullopt);
+    allowForSlip(z, m.residual, errors_.correlate(m).innovation + z.seen * Q * z.seen.transpose(), Q);
+  }
+  const Part noise_error = errors_.add(Q);
+  errors_.move(pose_error_, W, noise_error);
+  Vector3d noise = Vector3d::Zero();
+  std::vector<Part> parts = statesNotCloned();
+  for (const MotionMeasurement& z : increment.measured) {
+    const Measurement m = measurement(z, noise, noise_error);
+    noise += errors_.correlate(m).gain(noise_error) * m.residual;
+    // The noise is one of those that are corrected, by which its covariance shrinks.
+    parts.push_back(noise_error);
+    correct(m, parts);
+    parts.pop_back();
+  }
+  errors_.remove(noise_error);
+}
+
+OdometryIncrement MultiCloneFilter::refined(const OdometryIncrement& increment) const {
+  OdometryIncrement motion = calibrated(increment);
+  Matrix3d& Q = motion.covariance;
+  if (calibration_error_ && increment.by_wheels) {
+    const Matrix3d B = byCalibration(increment.before_from_after);
+    Q += B * errors_.covariance(*calibration_error_) * B.transpose();
+  }
+  for (const MotionMeasurement& z : increment.measured) {
+    Innovation::Vector r = z.value - z.seen * motion.before_from_after.vector();
+    MatrixXd R = z.noise;
+    if (z.bias_time > 0.0) {
+      r(0) -= z.bias_time * gyro_bias_;
+      R(0, 0) += z.bias_time * z.bias_time * gyroBiasVariance();
+    }
+    allowForSlip(z, r, z.seen * Q * z.seen.transpose() + R, Q);
+    const MatrixXd S = z.seen * Q * z.seen.transpose() + R;
+    const MatrixXd K = S.llt().solve(z.seen * Q).transpose();
+    motion.before_from_after = corrected(motion.before_from_after, K * r);
+    Q = symmetric(Q - K * z.seen * Q);
+  }
+  motion.measured.clear();
+  return motion;
+}
+
+void MultiCloneFilter::forgetCalibration(double way) {
+  const double kept = std::exp(-way / options_.calibration_way);
+  calibration_ *= kept;
+  errors_.move(*calibration_error_, (kept - 1.0) * Matrix3d::Identity(), *calibration_error_);
+  errors_.disturb(*calibration_error_,
+                  (1.0 - kept * kept) * options_.calibration_std.cwiseAbs2().asDiagonal().toDenseMatrix());
+}
+
+void MultiCloneFilter::age(double dt) {
+  const auto drift = [&](const std::optional<Part>& part, double rate) {
+    if (part) errors_.disturb(*part, MatrixXd::Constant(1, 1, rate * rate * dt));
+  };
+  drift(gyro_bias_error_, options_.gyro_bias_drift);
+  drift(compass_error_, options_.heading_drift);
+}
+
+// ---- displacements
 
 DisplacementPrediction MultiCloneFilter::predictedDisplacementFrom(std::size_t clone) const {
   Matrix3d J;
-  const SE2 reference_from_current = between(poses_[clone + 1], poses_.front(), nullptr, &J);  // (16)
-  const Matrix3d H = J * additive(poses_.front());
-  const Index k = rowOf(clone);
-  const Matrix3d cross = P_.block<3, 3>(0, k);
-  const Matrix3d difference = P_.topLeftCorner<3, 3>() + P_.block<3, 3>(k, k) - cross - cross.transpose();
+  const SE2 reference_from_current = between(clones_[clone].pose, pose_, nullptr, &J);  // (16)
+  const Matrix3d H = J * additive(pose_);
+  const Matrix3d cross = errors_.covariance(pose_error_, clones_[clone].error);
+  const Matrix3d difference =
+      errors_.covariance(pose_error_) + errors_.covariance(clones_[clone].error) - cross - cross.transpose();
   return {reference_from_current, H * difference * H.transpose()};
-}
-
-MatrixXd MultiCloneFilter::withRangeNoise(const Displacement& z, Index first, Index rows) const {
-  MatrixXd P_xs = ranges_[z.clone].with_state.middleRows(first, rows) * z.J_reference.transpose();
-  if (presentIsUsed()) P_xs += present_.with_state.middleRows(first, rows) * z.J_current.transpose();
-  return P_xs;
 }
 
 Innovation MultiCloneFilter::innovation(const Displacement& z) const {
   Innovation r;
   Matrix3d H_k;
   Matrix3d H_x;
-  const SE2 z_hat = between(poses_[z.clone + 1], poses_.front(), &H_k, &H_x);  // (16)
-  r.residual = z.observable * error(z.reference_from_current, z_hat);          // (17), projected on V_o
-  r.H_clone = z.observable * H_k;                                              // (18)
+  const SE2 z_hat = between(clones_[z.clone].pose, pose_, &H_k, &H_x);  // (16)
+  r.residual = z.observable * error(z.reference_from_current, z_hat);   // (17), projected on V_o
+  r.H_clone = z.observable * H_k;                                       // (18)
   r.H_pose = z.observable * H_x;
   r.noise = z.J_current * z.variance_current.asDiagonal() * z.J_current.transpose() + z.matching_noise;
-
-  const Index k = rowOf(z.clone);
-  const MatrixXd H = r.H_pose * additive(poses_.front());
-  const MatrixXd pose_with_noise = withRangeNoise(z, 0, 3);
-  const MatrixXd clone_with_noise = withRangeNoise(z, k, 3);
-  const MatrixXd pose_with_r = (P_.topLeftCorner<3, 3>() - P_.block<3, 3>(0, k)) * H.transpose() + pose_with_noise;
-  const MatrixXd clone_with_r = (P_.block<3, 3>(k, 0) - P_.block<3, 3>(k, k)) * H.transpose() + clone_with_noise;
-  r.covariance =
-      symmetric(H * (pose_with_r - clone_with_r) + (pose_with_noise - clone_with_noise).transpose() * H.transpose() +
-                z.J_reference * z.variance_reference.asDiagonal() * z.J_reference.transpose() + r.noise);  // (19)
-  r.gain = additive(poses_.front()) * gain(pose_with_r, r);                                                // (21)
+  const ErrorState::Correlation with_r = errors_.correlate(measurement(z, r));
+  r.covariance = with_r.innovation;                     // (19)
+  r.gain = additive(pose_) * with_r.gain(pose_error_);  // (21)
   return r;
 }
 
-void MultiCloneFilter::correct(RangeNoise& noise, const MatrixXd* J, const MatrixXd& K,
-                               const Eigen::Matrix<double, Eigen::Dynamic, 3>& H, Index clone_row) {
-  MatrixXd P_rz = H * (noise.with_state.topRows<3>() - noise.with_state.middleRows<3>(clone_row));
-  if (J != nullptr) P_rz += *J * noise.variance.asDiagonal();
-  noise.with_state.topRows(K.rows()).noalias() -= K * P_rz;
+ErrorState::Measurement MultiCloneFilter::measurement(const Displacement& z, const Innovation& r) const {
+  const Clone& clone = clones_[z.clone];
+  const MatrixXd H = r.H_pose * additive(pose_);
+  Measurement m{r.residual, {{pose_error_, H}, {clone.error, -H}}, {{clone.ranges, z.J_reference}}, r.noise};
+  if (present_) {
+    m.ranges.push_back({*present_, z.J_current});
+    m.noise = z.matching_noise;
+  }
+  return m;
 }
 
 void MultiCloneFilter::update(const Displacement& z, const Innovation& r) {
-  const Index k = rowOf(z.clone);
-  const MatrixXd H = r.H_pose * additive(poses_.front());
-  const MatrixXd P_xr = (P_.leftCols<3>() - P_.middleCols<3>(k)) * H.transpose() + withRangeNoise(z, 0, P_.rows());
-  // The newest clone's displacement corrects the present pose and considers the rest (21), others correct all poses.
-  const Index corrected = z.clone == 0 ? 3 : P_.rows();
-  const MatrixXd K = gain(P_xr.topRows(corrected), r);
-
-  if (!presentIsUsed()) present_ = {MatrixXd::Zero(P_.rows(), z.variance_current.size()), z.variance_current};
-  for (std::size_t i = 0; i < clones(); ++i) correct(ranges_[i], i == z.clone ? &z.J_reference : nullptr, K, H, k);
-  correct(present_, &z.J_current, K, H, k);
-
-  const MatrixXd KP_rx = K * P_xr.transpose();
-  P_.topRows(corrected) -= KP_rx;
-  P_.leftCols(corrected) -= KP_rx.transpose();
-  P_.topLeftCorner(corrected, corrected) += K * r.covariance * K.transpose();
-  P_ = symmetric(P_);  // (23)
-
-  const Eigen::VectorXd correction = K * r.residual;  // (22)
-  for (Index i = 0; i < corrected / 3; ++i) {
-    SE2& pose = poses_[static_cast<std::size_t>(i)];
-    pose = compose(exponential(correction.segment<3>(3 * i)), pose);
-  }
+  if (!present_) present_ = errors_.addRanges(z.variance_current);
+  correct(measurement(z, r), z.clone == 0 ? statesNotCloned() : allStates());  // (22)(23)
 }
 
 void MultiCloneFilter::clone(const Eigen::VectorXd& range_variances) {
-  if (clones() == 1 && ranges_.front().variance.size() == 0) forget(0);          // the start, which was no scan
-  if (!presentIsUsed() || present_.variance.size() != range_variances.size()) {  // not used: independent of all poses
-    present_ = {MatrixXd::Zero(P_.rows(), range_variances.size()), range_variances};
+  const bool start_is_reference = clones_.size() == 1 && errors_.variances(clones_.front().ranges).size() == 0;
+  if (start_is_reference) forget(0);  // which was no scan
+  if (present_ && errors_.variances(*present_).size() != range_variances.size()) {
+    errors_.removeRanges(*present_);
+    present_.reset();
   }
-  poses_.insert(poses_.begin(), SE2(poses_.front()));  // (24)
-  P_ = withClonedRows(withClonedRows(P_).transpose());
-  ranges_.insert(ranges_.begin(), std::move(present_));  // (26)
-  present_ = RangeNoise();
-  for (RangeNoise& noise : ranges_) noise.with_state = withClonedRows(noise.with_state);  // (25)
+  if (!present_) present_ = errors_.addRanges(range_variances);  // not used: independent of all poses
+  clones_.insert(clones_.begin(), {pose_, errors_.addCloneOf(pose_error_), *present_});  // (24)-(27)
+  present_.reset();
 }
 
 void MultiCloneFilter::forget(std::size_t clone) {
-  const Index k = rowOf(clone);
-  poses_.erase(poses_.begin() + static_cast<std::ptrdiff_t>(clone) + 1);
-  ranges_.erase(ranges_.begin() + static_cast<std::ptrdiff_t>(clone));
-  P_ = withoutRows(withoutRows(P_, k).transpose(), k);
-  for (RangeNoise& noise : ranges_) noise.with_state = withoutRows(noise.with_state, k);
-  if (presentIsUsed()) present_.with_state = withoutRows(present_.with_state, k);
+  errors_.remove(clones_[clone].error);
+  errors_.removeRanges(clones_[clone].ranges);
+  clones_.erase(clones_.begin() + static_cast<std::ptrdiff_t>(clone));
+}
+
+// ---- other measurements
+
+double MultiCloneFilter::update(const PoseMeasurement& measured, double nis_bound) {
+  const SE2 local(measured.pose.x - origin_.x(), measured.pose.y - origin_.y(), measured.pose.yaw);
+  const Matrix3d T_inverse = inverseOfAdditive(local);
+  Measurement m;
+  m.residual = logarithm(compose(local, inverse(pose_)));
+  m.terms.push_back({pose_error_, Matrix3d::Identity()});  // (34)
+  m.noise = symmetric(T_inverse * measured.covariance * T_inverse.transpose());
+  return update(m, nis_bound);
+}
+
+double MultiCloneFilter::updateHeading(double yaw, double variance, double nis_bound) {
+  if (!compass_error_) {
+    compass_from_world_ = yaw - pose_.yaw;
+    compass_error_ = errors_.add(MatrixXd::Constant(1, 1, variance));
+    errors_.move(*compass_error_, -kYaw, pose_error_);
+    return 0.0;
+  }
+  Measurement m;
+  m.residual = Eigen::VectorXd::Constant(1, wrapAngle(yaw - compass_from_world_ - pose_.yaw));
+  m.terms.push_back({pose_error_, kYaw});
+  m.terms.push_back({*compass_error_, MatrixXd::Ones(1, 1)});
+  m.noise = MatrixXd::Constant(1, 1, variance);
+  return update(m, nis_bound);
+}
+
+double MultiCloneFilter::update(const Measurement& m, double nis_bound) {
+  const MatrixXd S = errors_.correlate(m).innovation;
+  const double nis = m.residual.dot(S.llt().solve(m.residual));
+  if (nis <= nis_bound) correct(m, allStates());
+  return nis;
+}
+
+void MultiCloneFilter::enterWorld(const PoseMeasurement& world_from_base) {
+  const SE2 pose_there(0.0, 0.0, world_from_base.pose.yaw);
+  const SE2 d = compose(pose_there, inverse(pose_));
+  const Matrix3d Ad = adjoint(d);
+  // Until the pose is told, the whole may be anywhere: as far away as no building is large, and turned anyhow.
+  const Part unknown = errors_.add(Vector3d(1e4, 1e4, 100.0).asDiagonal().toDenseMatrix());
+  const auto enter = [&](SE2& pose, Part pose_error) {
+    pose = compose(d, pose);
+    errors_.move(pose_error, Ad - Matrix3d::Identity(), pose_error);
+    errors_.move(pose_error, Matrix3d::Identity(), unknown);
+  };
+  enter(pose_, pose_error_);
+  for (Clone& clone : clones_) enter(clone.pose, clone.error);
+  compass_from_world_ -= d.yaw;
+  if (compass_error_) errors_.move(*compass_error_, -kYaw, unknown);
+  errors_.remove(unknown);
+  origin_ = world_from_base.pose.translation();
+  update(world_from_base, kNoBound);
+}
+
+// ---- what is corrected
+
+std::vector<ErrorState::Part> MultiCloneFilter::statesNotCloned() const {
+  std::vector<Part> parts{pose_error_};
+  for (const auto& part : {calibration_error_, gyro_bias_error_, compass_error_}) {
+    if (part) parts.push_back(*part);
+  }
+  return parts;
+}
+
+std::vector<ErrorState::Part> MultiCloneFilter::allStates() const {
+  std::vector<Part> parts = statesNotCloned();
+  for (const Clone& clone : clones_) parts.push_back(clone.error);
+  return parts;
+}
+
+void MultiCloneFilter::correct(const Measurement& measurement, const std::vector<Part>& parts) {
+  const std::vector<Eigen::VectorXd> corrections = errors_.update(measurement, parts);
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const Eigen::VectorXd& c = corrections[i];
+    const auto is = [&](const std::optional<Part>& part) { return part && part->row == parts[i].row; };
+    if (is(pose_error_)) pose_ = compose(exponential(c), pose_);
+    if (is(calibration_error_)) calibration_ += c;
+    if (is(gyro_bias_error_)) gyro_bias_ += c(0);
+    if (is(compass_error_)) compass_from_world_ += c(0);
+    for (Clone& clone : clones_) {
+      if (is(clone.error)) clone.pose = compose(exponential(c), clone.pose);
+    }
+  }
 }
 
 }  // namespace sckf

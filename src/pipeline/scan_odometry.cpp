@@ -239,7 +239,7 @@ void ScanOdometry::setOptions(const PipelineOptions& options) {
 }
 
 void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp) {
-  filter_ = makeFusionMethod(options_.method, odom_from_base, symmetric(covariance));  // (6)(7)
+  filter_ = makeFusionMethod(options_.method, odom_from_base, symmetric(covariance), options_.states);  // (6)(7)
   filter_stamp_ = stamp;
   odometry_.discardBefore(stamp);
   wheels_known_ = true;
@@ -264,7 +264,7 @@ void ScanOdometry::carryOn() {
     carried_on_stamp_ = filter_stamp_;
   }
   for (const OdometryBuffer::Step& step : odometry_.steps(carried_on_stamp_, odometry_.newest())) {
-    carried_on_->propagate(increment(step));
+    carried_on_->propagate(filter_->refined(increment(step)));
   }
   carried_on_stamp_ = odometry_.newest();
 }

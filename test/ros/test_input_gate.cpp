@@ -67,8 +67,8 @@ TEST_F(InputGateTest, ABadScanIsRefusedByWhatIsWrongWithIt) {
   scan.angle_increment = -0.1F;
   EXPECT_EQ(admit(scan), 0u);
   EXPECT_EQ(health_.scans.received(), 3u);
-  EXPECT_THAT(health_.scans.ends(), ElementsAre(Pair("refused, angles turned round", 1u),
-                                                Pair("refused, no frame", 1u), Pair("refused, no stamp", 1u)));
+  EXPECT_THAT(health_.scans.ends(), ElementsAre(Pair("refused, angles turned round", 1u), Pair("refused, no frame", 1u),
+                                                Pair("refused, no stamp", 1u)));
 }
 
 TEST_F(InputGateTest, BadOdometryIsRefusedByWhatIsWrongWithIt) {

@@ -11,10 +11,46 @@
 
 namespace sckf {
 
+/// What another sensor says of the motion that an OdometryIncrement is about: value = S u + bias_time b + n, where u is
+/// the true (x, y, yaw) and b the bias of the gyro.
+struct MotionMeasurement {
+  Displacement::MatrixD3 seen;   ///< S, d × 3
+  Innovation::Vector value;      ///< d, of [m, rad]
+  Displacement::MatrixDD noise;  ///< covariance of n, d × d
+  double bias_time = 0.0;        ///< [s] over which a gyro turned its rate into a yaw, d = 1; 0: no gyro
+};
+
 /// Wheel odometry between two instants.
 struct OdometryIncrement {
   SE2 before_from_after;                                 ///< motion of base_link, in base_link before the motion
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Q of its error, in base_link before the motion
+  bool by_wheels = true;  ///< false: free of their systematic errors: guessed, or jitter while the robot stands
+  std::vector<MotionMeasurement> measured = {};  ///< by others; methods without such states leave it aside
+};
+
+/// Where the robot is in the world of an estimator, told by something else than displacements.
+struct PoseMeasurement {
+  SE2 pose;                    ///< world_from_base
+  Eigen::Matrix3d covariance;  ///< of its additive error in x, y, yaw
+};
+
+/// Systematic errors of the wheels: the true motion is (x (1 + s), y (1 + s), yaw (1 + r) + k √(x² + y²)).
+struct WheelCalibration {
+  Eigen::Vector3d error = Eigen::Vector3d::Zero();       ///< s, r, k [1, 1, rad/m]
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of what `error` errs by
+};
+
+/// States beside the pose that are not cloned (III-F). Where a standard deviation is zero there is no such state.
+struct StateOptions {
+  /// Of s, r and k of WheelCalibration: how large they can be [1, 1, rad/m]. They are taken for stationary processes,
+  /// which forget what they were within calibration_way [m]: an error of the wheels that passes leaves nothing behind.
+  Eigen::Vector3d calibration_std = Eigen::Vector3d::Zero();
+  double calibration_way = 100.0;
+
+  double gyro_bias_std = 0.0;    ///< [rad/s] of b at the start …
+  double gyro_bias_drift = 0.0;  ///< [rad/s/√s] … and by how much it wanders
+
+  double heading_drift = 0.0;  ///< [rad/√s] by how much a compass and the yaw in the world come apart
 };
 
 /// What a method expects the next displacement to be, before the scans are looked at.
@@ -45,6 +81,10 @@ class FusionMethod {
   virtual Innovation innovation(const Displacement& displacement) const = 0;
   virtual void update(const Displacement& displacement, const Innovation& innovation) = 0;
 
+  /// What the increment is with all that is known of the wheels and all that is measured of the motion.
+  virtual OdometryIncrement refined(const OdometryIncrement& increment) const { return increment; }
+  virtual WheelCalibration calibration() const { return {}; }
+
   /// The methods of the paper have one clone, which clone() replaces. Others have several, the newest number 0, and any
   /// of them can be the reference of a displacement.
   virtual std::size_t clones() const { return 1; }
@@ -60,8 +100,9 @@ class FusionMethod {
 /// The names that makeFusionMethod() knows, the default first.
 const std::vector<std::string>& fusionMethodNames();
 
-/// The method of that name, started at a pose with a covariance; null if there is no such name.
+/// The method of that name, started at a pose with a covariance; null if there is no such name. Only sckf_multi has
+/// other states.
 std::unique_ptr<FusionMethod> makeFusionMethod(const std::string& name, const SE2& odom_from_base,
-                                               const Eigen::Matrix3d& covariance);
+                                               const Eigen::Matrix3d& covariance, const StateOptions& states = {});
 
 }  // namespace sckf

@@ -1,16 +1,19 @@
 // Stochastic cloning with several clones: the present scan may be compared with any of the references that are kept.
-// Section V-B of the paper of stochastic_cloning_filter.h, for displacements.
+// Sections III-F and V of the paper of stochastic_cloning_filter.h.
 #pragma once
 
+#include <optional>
 #include <vector>
 
+#include "sckf_odometry/core/error_state.h"
 #include "sckf_odometry/core/fusion_method.h"
 
 namespace sckf {
 
-/// An extended Kalman filter of the present pose and of every clone, with the range noise of the scans considered. A
-/// displacement from the newest clone corrects the present pose, as in Algorithm 1; one from an older clone corrects
-/// the clones too. clone() adds a clone, the newest, number 0; forget() removes one.
+/// An extended Kalman filter of the present pose, of every clone and, if asked for, of states that are not cloned:
+/// systematic errors of the wheels, the bias of a gyro, the heading of a compass. The range noise of the scans is
+/// considered. A displacement from the newest clone corrects all but the clones, as in Algorithm 1; one from an older
+/// clone corrects the clones too. clone() adds a clone, the newest, number 0; forget() removes one.
 ///
 /// Beyond the paper, its error state ξ = (ρ, θ) is a displacement of the world: X = exp(ξ) ⊕ X̂, so that
 ///   X̃ = T(X̂) ξ,  T = [I 𝒥p̂; 0 1].
@@ -18,14 +21,19 @@ namespace sckf {
 /// their ξ, wherever they are estimated to be: nothing that is common to all poses is ever taken for known.
 class MultiCloneFilter : public FusionMethod {
  public:
-  MultiCloneFilter(const SE2& odom_from_base, const Eigen::Matrix3d& covariance);
+  MultiCloneFilter(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, const StateOptions& states = {});
 
-  SE2 pose() const override { return inOdom(poses_.front()); }
+  SE2 pose() const override { return inWorld(pose_); }
   Eigen::Matrix3d covariance() const override;
-  SE2 clonedPose(std::size_t clone) const { return inOdom(poses_[clone + 1]); }
+  SE2 clonedPose(std::size_t clone) const { return inWorld(clones_[clone].pose); }
+  WheelCalibration calibration() const override;
+  double gyroBias() const { return gyro_bias_; }  ///< [rad/s]
+  double gyroBiasVariance() const { return varianceOf(gyro_bias_error_); }
 
   void propagate(const OdometryIncrement& increment) override;
-  std::size_t clones() const override { return ranges_.size(); }
+  OdometryIncrement refined(const OdometryIncrement& increment) const override;
+
+  std::size_t clones() const override { return clones_.size(); }
   DisplacementPrediction predictedDisplacement() const override { return predictedDisplacementFrom(0); }
   DisplacementPrediction predictedDisplacementFrom(std::size_t clone) const override;
   Innovation innovation(const Displacement& displacement) const override;
@@ -33,28 +41,55 @@ class MultiCloneFilter : public FusionMethod {
   void clone(const Eigen::VectorXd& range_variances) override;
   void forget(std::size_t clone) override;
 
+  /// Measurements that are no displacements (V-A): all states are corrected, unless the innovation, normalised and
+  /// squared, exceeds a bound. Returns it.
+  double update(const PoseMeasurement& measurement, double nis_bound);
+  /// yaw: of base_link in the frame of a compass or an IMU, whose own yaw in the world is estimated. variance [rad²]
+  double updateHeading(double yaw, double variance, double nis_bound);
+  /// Time passes: for what drifts with it. [s]
+  void age(double dt);
+
+  /// The same robot in another world, of which only the pose there is known, to a covariance.
+  void enterWorld(const PoseMeasurement& world_from_base);
+
  private:
-  /// The noise of one scan's ranges.
-  struct RangeNoise {
-    Eigen::MatrixXd with_state;  ///< covariance of all ξ and z̃, 3(N + 1) × M
-    Eigen::VectorXd variance;    ///< M, the diagonal of R
+  using Part = ErrorState::Part;
+  using Measurement = ErrorState::Measurement;
+
+  struct Clone {
+    SE2 pose;
+    Part error;
+    ErrorState::Ranges ranges;
   };
 
-  SE2 inOdom(const SE2& pose) const;
-  bool presentIsUsed() const { return present_.variance.size() > 0; }
+  SE2 inWorld(const SE2& pose) const;
+  double varianceOf(const std::optional<Part>& part) const;
+  OdometryIncrement calibrated(const OdometryIncrement& increment) const;
+  static Eigen::Matrix3d byCalibration(const SE2& motion);
+  void forgetCalibration(double way);
+  void measureMotion(const OdometryIncrement& motion, const Eigen::Matrix3d& W);
+  Measurement measurement(const Displacement& displacement, const Innovation& innovation) const;
+  double update(const Measurement& measurement, double nis_bound);
 
-  /// Covariance of some rows of the state and of the range noise in an innovation, J^k z̃_k + J^{k+m} z̃_{k+m}: rows × d.
-  Eigen::MatrixXd withRangeNoise(const Displacement& displacement, Eigen::Index first, Eigen::Index rows) const;
+  std::vector<Part> statesNotCloned() const;
+  std::vector<Part> allStates() const;
+  void correct(const Measurement& measurement, const std::vector<Part>& parts);
 
-  /// P_Xz ← P_Xz − K P_rz of one scan, whose noise the innovation contains through J, unless that is null.
-  static void correct(RangeNoise& noise, const Eigen::MatrixXd* J, const Eigen::MatrixXd& K,
-                      const Eigen::Matrix<double, Eigen::Dynamic, 3>& H, Eigen::Index clone_row);
+  StateOptions options_;
+  ErrorState errors_;
 
-  Eigen::Vector2d origin_;          // in odom, of the poses below: where the estimate began
-  std::vector<SE2> poses_;          // of base_link: the present one, then the clones, the newest first
-  Eigen::MatrixXd P_;               // of their ξ, 3(N + 1) × 3(N + 1)
-  std::vector<RangeNoise> ranges_;  // of the scans of the clones
-  RangeNoise present_;              // of the present scan, empty until it is used
+  Eigen::Vector2d origin_;  // in the world, of the poses below: where the estimate began
+  SE2 pose_;                // of base_link
+  Part pose_error_;
+  std::vector<Clone> clones_;                  // the newest first
+  std::optional<ErrorState::Ranges> present_;  // of the present scan, once it has been used
+
+  Eigen::Vector3d calibration_ = Eigen::Vector3d::Zero();
+  std::optional<Part> calibration_error_;
+  double gyro_bias_ = 0.0;  // [rad/s]
+  std::optional<Part> gyro_bias_error_;
+  double compass_from_world_ = 0.0;  // [rad]
+  std::optional<Part> compass_error_;
 };
 
 }  // namespace sckf

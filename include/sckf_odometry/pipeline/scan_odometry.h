@@ -33,6 +33,7 @@ struct GateOptions {
 struct PipelineOptions {
   std::string method = "sckf_multi";  ///< one of fusionMethodNames()
   OdometryNoise odometry_noise;
+  StateOptions states;  ///< of a new estimate
   bool prefer_twist_covariance = false;  ///< use the twist covariance of the odometry message where it is sensible
   ScanOptions scan;
   MatcherOptions matcher;
