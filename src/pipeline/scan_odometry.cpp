@@ -26,6 +26,16 @@ void checkMethod(const std::string& method) {
   throw std::invalid_argument("method is \"" + method + "\": expected one of " + known);
 }
 
+/// What is on has to be there: other methods have no states but the pose.
+void checkStates(const PipelineOptions& options) {
+  const auto refuse = [&options](const std::string& parameter) {
+    throw std::invalid_argument(parameter + " is true: expected false with method \"" + options.method +
+                                "\"; only \"sckf_multi\" has states beside the pose");
+  };
+  if (options.method == "sckf_multi") return;
+  if (options.calibration.on) refuse("calibrate_odometry");
+}
+
 void checkPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance) {
   constexpr double kLargest = 1e9;  // beyond, doubles tell centimetres no more
   const Eigen::Vector3d pose = odom_from_base.vector();
@@ -63,6 +73,7 @@ ScanOdometry::ScanOdometry(const PipelineOptions& options, const SE2& odom_from_
       start_(odom_from_base),
       start_covariance_(covariance) {
   checkMethod(options.method);
+  checkStates(options);
   checkPose(odom_from_base, covariance);
 }
 
@@ -141,6 +152,7 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
     references_.add(report.scan, options_.reference.kept, *filter_);
   }
   report.estimate = estimate();
+  report.calibration = filter_->calibration();
   carried_on_.reset();
   carryOn();
   report.total_time = secondsSince(begin);
@@ -239,7 +251,8 @@ void ScanOdometry::setOptions(const PipelineOptions& options) {
 }
 
 void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp) {
-  filter_ = makeFusionMethod(options_.method, odom_from_base, symmetric(covariance), options_.states);  // (6)(7)
+  filter_ = makeFusionMethod(options_.method, odom_from_base, symmetric(covariance),
+                             statesFor(options_.calibration));  // (6)(7)
   filter_stamp_ = stamp;
   odometry_.discardBefore(stamp);
   wheels_known_ = true;
@@ -295,7 +308,7 @@ bool ScanOdometry::bridgeTo(Stamp stamp) {
 void ScanOdometry::followWheels(Stamp since) {
   for (const OdometryBuffer::Step& step : odometry_.steps(since, odometry_.newest())) {
     if (step.guess) continue;
-    twist_.add(increment(step), seconds(step.to.stamp - step.from.stamp));
+    twist_.add(filter_->refined(increment(step)), seconds(step.to.stamp - step.from.stamp));
     motion_known_ = step.to.stamp;
   }
 }

@@ -52,6 +52,7 @@ void Health::scanTaken(const ScanReport& report) {
   }
   if (!report.estimate) return;
   last_stamp_ = report.stamp;
+  calibration_ = report.calibration;
   if (report.new_reference) reference_stamp_ = report.stamp;
   ++timed_;
   time_ += report.total_time;
@@ -150,9 +151,19 @@ void Health::addEstimate(const Conditions& conditions, StatusWrapper& status) co
   status.add("wheel slips", slips_);
   status.addf("NIS", "%.3f", last_nis_);
   status.add("observed dimension", last_dimension_);
+  addCalibration(status);
   if (reference_stamp_ == Stamp(0)) return;
   status.addf("reference age [s]", "%.3f",
               seconds(std::max(last_stamp_, conditions.newest_odometry) - reference_stamp_));
+}
+
+void Health::addCalibration(StatusWrapper& status) const {
+  const Eigen::Vector3d std = calibration_.covariance.diagonal().cwiseSqrt();
+  if (std.isZero(0.0)) return;
+  const char* const of[] = {"way [1]", "rotation [1]", "rotation per meter [rad/m]"};
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    status.addf(std::string("error of the wheels: ") + of[i], "%.4f +- %.4f", calibration_.error(i), std(i));
+  }
 }
 
 }  // namespace sckf

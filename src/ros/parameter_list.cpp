@@ -79,6 +79,18 @@ List odometryParameters(PipelineOptions& pipeline) {
   };
 }
 
+/// Of a new estimate: they cannot change while there is one.
+List otherSensors(PipelineOptions& pipeline) {
+  CalibrationOptions& calibration = pipeline.calibration;
+  return {
+      flag("calibrate_odometry", calibration.on),
+      number("calibration_distance_std", calibration.distance_std, aboveUpTo(0.0, 1.0)),
+      number("calibration_rotation_std", calibration.rotation_std, aboveUpTo(0.0, 1.0)),
+      number("calibration_rotation_per_meter_std", calibration.rotation_per_meter_std, aboveUpTo(0.0, 1.0), "rad/m"),
+      number("calibration_way", calibration.way, within(0.1, 1e6), "m"),
+  };
+}
+
 List estimationParameters(PipelineOptions& pipeline) {
   ReferenceOptions& reference = pipeline.reference;
   GateOptions& gate = pipeline.gate;
@@ -150,6 +162,8 @@ std::vector<Parameter> parameterList(Options& options) {
   PipelineOptions& pipeline = options.pipeline;
   List all = nodeParameters(options.node);
   all.push_back(text("method", pipeline.method, fusionMethodNames()));
+  const List other = otherSensors(pipeline);
+  all.insert(all.end(), other.begin(), other.end());
   for (const List& list :
        {nodeParametersAtRunTime(options.node), odometryParameters(pipeline), estimationParameters(pipeline),
         scanParameters(pipeline.scan), matcherParameters(pipeline.matcher)}) {

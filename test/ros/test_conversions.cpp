@@ -262,6 +262,8 @@ TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
   report.nis_bound = 13.8;
   report.reference_stamp = std::chrono::seconds(4);
   report.older_references = 2;
+  report.calibration.error << 0.03, -0.02, 0.01;
+  report.calibration.covariance = Eigen::Vector3d(1e-4, 4e-4, 9e-4).asDiagonal();
   report.match_time = 0.001;
   report.total_time = 0.002;
   const auto status = toStatus(report, "sckf", "odom", ros::Time(7.5));
@@ -279,6 +281,12 @@ TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
   EXPECT_EQ(status.nis_bound, 13.8);
   EXPECT_EQ(status.reference_age, 3.0);
   EXPECT_EQ(status.older_references, 2);
+  EXPECT_EQ(status.calibration_distance, 0.03);
+  EXPECT_EQ(status.calibration_rotation, -0.02);
+  EXPECT_EQ(status.calibration_rotation_per_meter, 0.01);
+  EXPECT_NEAR(status.calibration_distance_std, 0.01, 1e-12);
+  EXPECT_NEAR(status.calibration_rotation_std, 0.02, 1e-12);
+  EXPECT_NEAR(status.calibration_rotation_per_meter_std, 0.03, 1e-12);
   EXPECT_EQ(status.match_time, 0.001);
   EXPECT_EQ(status.total_time, 0.002);
   EXPECT_NEAR(status.latency, 0.5, 1e-9);

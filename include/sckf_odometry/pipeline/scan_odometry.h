@@ -12,6 +12,7 @@
 #include "sckf_odometry/core/fusion_method.h"
 #include "sckf_odometry/matching/scan_matcher.h"
 #include "sckf_odometry/pipeline/odometry_buffer.h"
+#include "sckf_odometry/pipeline/other_sensors.h"
 #include "sckf_odometry/pipeline/reference_policy.h"
 #include "sckf_odometry/pipeline/reference_scans.h"
 #include "sckf_odometry/pipeline/scan_report.h"
@@ -33,7 +34,7 @@ struct GateOptions {
 struct PipelineOptions {
   std::string method = "sckf_multi";  ///< one of fusionMethodNames()
   OdometryNoise odometry_noise;
-  StateOptions states;  ///< of a new estimate
+  CalibrationOptions calibration;
   bool prefer_twist_covariance = false;  ///< use the twist covariance of the odometry message where it is sensible
   ScanOptions scan;
   MatcherOptions matcher;
@@ -50,7 +51,8 @@ struct PipelineOptions {
 class ScanOdometry {
  public:
   /// The estimate starts at a pose, with a covariance: symmetric, positive semi-definite. Throws std::invalid_argument
-  /// with name, value and what is expected if there is no method of that name, or pose or covariance are none.
+  /// with name, value and what is expected if there is no method of that name, if it lacks what the options ask for, or
+  /// if pose or covariance are none.
   explicit ScanOdometry(const PipelineOptions& options, const SE2& odom_from_base = SE2(),
                         const Eigen::Matrix3d& covariance = Eigen::Matrix3d::Zero());
 

@@ -47,6 +47,7 @@ struct ScanReport {
   bool new_reference = false;                ///< it became the reference
   int older_references = 0;                  ///< so many more references corrected the estimate
   bool wheels_known = true;                  ///< false: wheels did not tell all of the motion since the scan before
+  WheelCalibration calibration;              ///< then; its covariance is zero if it is not estimated
   double match_time = 0.0;                   ///< [s] spent on the comparison with the reference …
   double total_time = 0.0;                   ///< [s] … and on the scan on the whole
   std::shared_ptr<const PreparedScan> scan;  ///< its points in base_link; null if it was not used

@@ -58,6 +58,7 @@ class Health {
   void addOdometry(const Conditions& conditions, const ros::Time& now,
                    diagnostic_updater::DiagnosticStatusWrapper& status);
   void addEstimate(const Conditions& conditions, diagnostic_updater::DiagnosticStatusWrapper& status) const;
+  void addCalibration(diagnostic_updater::DiagnosticStatusWrapper& status) const;
 
   std::string odometry_source_;
   std::string scan_topic_;
@@ -71,6 +72,7 @@ class Health {
   double last_nis_ = 0.0;
   Stamp reference_stamp_{0};
   Stamp last_stamp_{0};
+  WheelCalibration calibration_;  // covariance zero: not estimated
   std::size_t slips_ = 0;
   std::size_t slips_reported_ = 0;
   std::size_t odometry_jumps_before_ = 0;  // of pipelines that were dropped

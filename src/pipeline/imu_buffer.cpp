@@ -1,0 +1,81 @@
+#include "sckf_odometry/pipeline/imu_buffer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "sckf_odometry/core/se2.h"
+#include "sckf_odometry/pipeline/odometry_buffer.h"
+
+namespace sckf {
+
+namespace {
+
+/// Readings that wait for odometry, without which none is ever used.
+constexpr std::size_t kMostSamples = 20000;
+
+bool earlier(const ImuSample& sample, Stamp stamp) { return sample.stamp < stamp; }
+
+bool isFinite(const std::optional<double>& value) { return !value || std::isfinite(*value); }
+
+double share(const ImuSample& before, const ImuSample& after, Stamp stamp) {
+  return seconds(stamp - before.stamp) / seconds(after.stamp - before.stamp);
+}
+
+double rateAt(const ImuSample& before, const ImuSample& after, Stamp stamp) {
+  return *before.yaw_rate + share(before, after, stamp) * (*after.yaw_rate - *before.yaw_rate);
+}
+
+}  // namespace
+
+ImuBuffer::Insertion ImuBuffer::insert(const ImuSample& sample) {
+  if (!isFinite(sample.yaw_rate) || !isFinite(sample.yaw) || !isTime(sample.stamp)) return Insertion::kNotFinite;
+  if (discarded_ && sample.stamp < *discarded_) return Insertion::kTooOld;
+  const auto after = std::lower_bound(samples_.begin(), samples_.end(), sample.stamp, earlier);
+  if (after != samples_.end() && after->stamp == sample.stamp) return Insertion::kDuplicate;
+  samples_.insert(after, sample);
+  if (samples_.size() > kMostSamples) samples_.pop_front();
+  return Insertion::kInserted;
+}
+
+bool ImuBuffer::isGap(const ImuSample& before, const ImuSample& after) const {
+  return seconds(after.stamp - before.stamp) > longest_gap_;
+}
+
+ImuBuffer::Samples::const_iterator ImuBuffer::bracket(Stamp stamp) const {
+  const auto after = std::lower_bound(samples_.begin(), samples_.end(), stamp, earlier);
+  if (after == samples_.end() || after->stamp == stamp) return after;
+  const bool told = after != samples_.begin() && !isGap(*std::prev(after), *after);
+  return told ? after : samples_.end();
+}
+
+std::optional<double> ImuBuffer::rotation(Stamp from, Stamp to) const {
+  auto after = bracket(from);
+  if (after == samples_.end() || bracket(to) == samples_.end() || from >= to) return std::nullopt;
+  if (after->stamp == from) ++after;
+  double rotation = 0.0;
+  for (Stamp begin = from; begin < to; ++after) {
+    const auto before = std::prev(after);
+    if (isGap(*before, *after) || !before->yaw_rate || !after->yaw_rate) return std::nullopt;
+    const Stamp end = std::min(after->stamp, to);
+    rotation += 0.5 * (rateAt(*before, *after, begin) + rateAt(*before, *after, end)) * seconds(end - begin);
+    begin = end;
+  }
+  return rotation;
+}
+
+std::optional<double> ImuBuffer::yaw(Stamp stamp) const {
+  const auto after = bracket(stamp);
+  if (after == samples_.end() || !after->yaw) return std::nullopt;
+  if (after->stamp == stamp) return after->yaw;
+  const auto before = std::prev(after);
+  if (!before->yaw) return std::nullopt;
+  return wrapAngle(*before->yaw + share(*before, *after, stamp) * wrapAngle(*after->yaw - *before->yaw));
+}
+
+void ImuBuffer::discardBefore(Stamp stamp) {
+  while (samples_.size() > 1 && samples_[1].stamp <= stamp) samples_.pop_front();
+  discarded_ = stamp;
+}
+
+}  // namespace sckf

@@ -1,0 +1,54 @@
+#include "sckf_odometry/pipeline/map_filter.h"
+
+namespace sckf {
+
+void MapFilter::propagate(const OdometryIncrement& increment) {
+  odom_->propagate(increment);
+  if (map_) map_->propagate(increment);
+}
+
+void MapFilter::age(double dt) {
+  odom_->age(dt);
+  if (map_) map_->age(dt);
+}
+
+void MapFilter::update(const Displacement& displacement, const Innovation& innovation) {
+  odom_->update(displacement, innovation);
+  if (map_) map_->update(displacement, map_->innovation(displacement));
+}
+
+double MapFilter::updateHeading(double yaw, double variance, double nis_bound) {
+  if (map_) map_->updateHeading(yaw, variance, nis_bound);
+  return odom_->updateHeading(yaw, variance, nis_bound);
+}
+
+void MapFilter::clone(const Eigen::VectorXd& range_variances) {
+  odom_->clone(range_variances);
+  if (map_) map_->clone(range_variances);
+}
+
+void MapFilter::forget(std::size_t clone) {
+  odom_->forget(clone);
+  if (map_) map_->forget(clone);
+}
+
+PoseOutcome MapFilter::update(const PoseMeasurement& map_from_base, double nis_bound, int max_rejected, double* nis) {
+  if (nis != nullptr) *nis = 0.0;
+  if (!map_) return enter(map_from_base);
+  const double contradiction = map_->update(map_from_base, nis_bound);
+  if (nis != nullptr) *nis = contradiction;
+  if (contradiction <= nis_bound) {
+    rejected_ = 0;
+    return PoseOutcome::kUsed;
+  }
+  return ++rejected_ < max_rejected ? PoseOutcome::kContradicts : enter(map_from_base);
+}
+
+PoseOutcome MapFilter::enter(const PoseMeasurement& map_from_base) {
+  map_ = std::make_unique<MultiCloneFilter>(*odom_);
+  map_->enterWorld(map_from_base);
+  rejected_ = 0;
+  return PoseOutcome::kEntered;
+}
+
+}  // namespace sckf
