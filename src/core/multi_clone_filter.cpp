@@ -178,7 +178,7 @@ OdometryIncrement MultiCloneFilter::refined(const OdometryIncrement& increment) 
     MatrixXd R = z.noise;
     if (z.bias_time > 0.0) {
       r(0) -= z.bias_time * gyro_bias_;
-      R(0, 0) += z.bias_time * z.bias_time * gyroBiasVariance();
+      R(0, 0) += z.bias_time * z.bias_time * gyroBias().variance;
     }
     allowForSlip(z, r, z.seen * Q * z.seen.transpose() + R, Q);
     const MatrixXd S = z.seen * Q * z.seen.transpose() + R;

@@ -2,6 +2,22 @@
 
 namespace sckf {
 
+std::string toString(PoseOutcome outcome) {
+  switch (outcome) {
+    case PoseOutcome::kEntered:
+      return "entered";
+    case PoseOutcome::kUsed:
+      return "used";
+    case PoseOutcome::kContradicts:
+      return "contradicts";
+    case PoseOutcome::kTooLate:
+      return "too late";
+    case PoseOutcome::kNoOdometry:
+      return "no odometry";
+  }
+  return "unknown";
+}
+
 void MapFilter::propagate(const OdometryIncrement& increment) {
   odom_->propagate(increment);
   if (map_) map_->propagate(increment);

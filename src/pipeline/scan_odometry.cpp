@@ -28,12 +28,15 @@ void checkMethod(const std::string& method) {
 
 /// What is on has to be there: other methods have no states but the pose.
 void checkStates(const PipelineOptions& options) {
-  const auto refuse = [&options](const std::string& parameter) {
-    throw std::invalid_argument(parameter + " is true: expected false with method \"" + options.method +
+  const auto refuse = [&options](const std::string& parameter, const std::string& expected) {
+    throw std::invalid_argument(parameter + ": expected " + expected + " with method \"" + options.method +
                                 "\"; only \"sckf_multi\" has states beside the pose");
   };
   if (options.method == "sckf_multi") return;
-  if (options.calibration.on) refuse("calibrate_odometry");
+  if (options.calibration.on) refuse("calibrate_odometry is true", "false");
+  if (options.imu.gyro) refuse("use_imu is true", "false");
+  if (options.imu.orientation) refuse("use_imu_orientation is true", "false");
+  if (options.standstill.time > 0.0) refuse("standstill_time is " + std::to_string(options.standstill.time), "0");
 }
 
 void checkPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance) {
@@ -69,6 +72,7 @@ ScanOdometry::ScanOdometry(const PipelineOptions& options, const SE2& odom_from_
       matcher_(options.matcher),
       reference_policy_(options.reference),
       odometry_(options.motion, options.odometry_timeout),
+      imu_(options.imu.timeout),
       twist_(options.twist_window),
       start_(odom_from_base),
       start_covariance_(covariance) {
@@ -94,6 +98,7 @@ OdometryBuffer::Insertion ScanOdometry::addOdometry(const OdometrySample& sample
   if (too_old > filter_stamp_) {
     const Stamp last = odometry_.lastUpTo(too_old);
     if (last > filter_stamp_) propagateTo(last);
+    if (carried_on_stamp_ < filter_stamp_) carryOn();
   }
   return insertion;
 }
@@ -115,7 +120,7 @@ void ScanOdometry::addScan(LaserScan scan, const Eigen::Isometry3d& base_from_la
 std::vector<ScanReport> ScanOdometry::process() {
   std::vector<ScanReport> reports;
   reports.swap(given_up_);
-  while (!waiting_.empty()) {
+  while (!waiting_.empty() && imuTells(waiting_.oldest())) {
     const bool bracketed = filter_ && waiting_.oldest() <= odometry_.newest();
     if (!bracketed && !bridgeTo(waiting_.oldest())) break;
     reports.push_back(take(waiting_.takeOldest()));
@@ -136,6 +141,7 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   std::optional<DisplacementPrediction> at_before;  // asked for where wheels do not tell the twist
   if (odometry_.endsBridged()) at_before = filter_->predictedDisplacement();
   propagateTo(stamp);  // (9)-(14)
+  useHeading(report);  // (34)
   report.wheels_known = std::exchange(wheels_known_, true);
   report.scan = prepareScan(waiting.scan, waiting.base_from_laser, options_.scan, &report.reason);
   if (!report.scan) {
@@ -153,6 +159,9 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   }
   report.estimate = estimate();
   report.calibration = filter_->calibration();
+  report.gyro_bias = filter_->gyroBias();
+  report.gyro_time = std::exchange(gyro_time_, 0.0);
+  report.stands = standstill_.stands(options_.standstill);
   carried_on_.reset();
   carryOn();
   report.total_time = secondsSince(begin);
@@ -225,8 +234,8 @@ bool ScanOdometry::looksLikeSlip(const Match& match) const {
 }
 
 std::optional<Estimate> ScanOdometry::latest() const {
-  if (!carried_on_) return std::nullopt;
-  return Estimate{carried_on_stamp_, carried_on_->pose(), carried_on_->covariance(), twist_.twist()};
+  if (!latest_) return std::nullopt;
+  return Estimate{latest_stamp_, latest_->pose(), latest_->covariance(), twist_.twist()};
 }
 
 void ScanOdometry::setPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp) {
@@ -252,10 +261,11 @@ void ScanOdometry::setOptions(const PipelineOptions& options) {
 
 void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp) {
   filter_ = makeFusionMethod(options_.method, odom_from_base, symmetric(covariance),
-                             statesFor(options_.calibration));  // (6)(7)
+                             statesFor(options_.calibration, options_.imu));  // (6)(7)
   filter_stamp_ = stamp;
   odometry_.discardBefore(stamp);
   wheels_known_ = true;
+  standstill_.interrupt();
   references_.clear();
   reference_policy_ = ReferencePolicy(options_.reference);
   carried_on_.reset();
@@ -264,22 +274,60 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
 
 void ScanOdometry::propagateTo(Stamp stamp) {
   for (const OdometryBuffer::Step& step : odometry_.steps(filter_stamp_, stamp)) {
-    filter_->propagate(increment(step));
+    const OdometryIncrement motion = increment(step, standstill_);
+    const double dt = seconds(step.to.stamp - step.from.stamp);
+    filter_->propagate(motion);
+    filter_->age(dt);
+    for (const MotionMeasurement& z : motion.measured) gyro_time_ += z.bias_time;
     if (step.guess) wheels_known_ = false;
   }
   filter_stamp_ = stamp;
   odometry_.discardBefore(stamp);
+  imu_.discardBefore(stamp);
+}
+
+void ScanOdometry::useHeading(ScanReport& report) {
+  if (!options_.imu.orientation) return;
+  const std::optional<double> yaw = imu_.yaw(report.stamp);
+  if (!yaw) return;
+  const double std = options_.imu.orientation_std;
+  const double bound = chiSquared(1, options_.gate.probability);
+  const bool contradicts = filter_->updateHeading(*yaw, std * std, bound) > bound;
+  report.heading = contradicts ? HeadingUse::kContradicts : HeadingUse::kUsed;
+}
+
+/// Whether there is nothing to wait for: the IMU tells, or is silent.
+bool ScanOdometry::imuTells(Stamp stamp) const {
+  if (!options_.imu.isUsed() || imu_.empty() || stamp <= imu_.newest()) return true;
+  const Stamp silent = imu_.newest() + toDuration(options_.imu.timeout);
+  return (!odometry_.empty() && odometry_.newest() > silent) || waiting_.countAfter(silent) > 0;
+}
+
+/// The newest sample of odometry of which the IMU can tell no more than it has told.
+Stamp ScanOdometry::settled() const {
+  const Stamp newest = odometry_.newest();
+  if (imuTells(newest)) return newest;
+  return std::max(carried_on_stamp_, odometry_.lastUpTo(std::max(imu_.newest(), carried_on_stamp_)));
 }
 
 void ScanOdometry::carryOn() {
-  if (!carried_on_) {
+  if (!carried_on_ || carried_on_stamp_ < filter_stamp_) {
     carried_on_.emplace(filter_->pose(), filter_->covariance());
     carried_on_stamp_ = filter_stamp_;
+    carried_on_standstill_ = standstill_;
   }
-  for (const OdometryBuffer::Step& step : odometry_.steps(carried_on_stamp_, odometry_.newest())) {
-    carried_on_->propagate(filter_->refined(increment(step)));
-  }
-  carried_on_stamp_ = odometry_.newest();
+  const auto carry = [this](DeadReckoning& estimate, Standstill& standstill, Stamp from, Stamp to) {
+    for (const OdometryBuffer::Step& step : odometry_.steps(from, to)) {
+      estimate.propagate(filter_->refined(increment(step, standstill)));
+    }
+  };
+  const Stamp settled = this->settled();
+  carry(*carried_on_, carried_on_standstill_, carried_on_stamp_, settled);
+  carried_on_stamp_ = settled;
+  latest_ = carried_on_;
+  Standstill standstill = carried_on_standstill_;
+  latest_stamp_ = odometry_.newest();
+  carry(*latest_, standstill, settled, latest_stamp_);
 }
 
 bool ScanOdometry::onScansAlone() const {
@@ -308,7 +356,7 @@ bool ScanOdometry::bridgeTo(Stamp stamp) {
 void ScanOdometry::followWheels(Stamp since) {
   for (const OdometryBuffer::Step& step : odometry_.steps(since, odometry_.newest())) {
     if (step.guess) continue;
-    twist_.add(filter_->refined(increment(step)), seconds(step.to.stamp - step.from.stamp));
+    twist_.add(filter_->refined(byWheels(step)), seconds(step.to.stamp - step.from.stamp));
     motion_known_ = step.to.stamp;
   }
 }
@@ -327,9 +375,28 @@ void ScanOdometry::followScans(Stamp since, const DisplacementPrediction& at_sin
 
 MotionGuess ScanOdometry::guess() const { return {twist_.twist().mean, motion_known_}; }
 
-OdometryIncrement ScanOdometry::increment(const OdometryBuffer::Step& step) const {
+OdometryIncrement ScanOdometry::increment(const OdometryBuffer::Step& step, Standstill& standstill) const {
+  OdometryIncrement increment = byWheels(step);
+  const SE2& motion = increment.before_from_after;
+  const double dt = seconds(step.to.stamp - step.from.stamp);
+  if (options_.imu.gyro) {
+    const std::optional<double> rotation = imu_.rotation(step.from.stamp, step.to.stamp);
+    if (rotation) increment.measured.push_back(gyroMeasurement(*rotation, motion.yaw, dt, options_.imu));
+  }
+  step.guess ? standstill.interrupt() : standstill.add(motion, dt, options_.standstill);
+  if (standstill.stands(options_.standstill)) {
+    increment.by_wheels = false;
+    increment.measured.push_back(standstillMeasurement(dt, options_.standstill));
+  }
+  return increment;
+}
+
+OdometryIncrement ScanOdometry::byWheels(const OdometryBuffer::Step& step) const {
   if (step.guess) {
-    return guessedIncrement(*step.guess, step.from.stamp, step.to.stamp, options_.odometry_timeout, options_.motion);
+    OdometryIncrement guessed =
+        guessedIncrement(*step.guess, step.from.stamp, step.to.stamp, options_.odometry_timeout, options_.motion);
+    guessed.by_wheels = false;
+    return guessed;
   }
   const SE2 motion = between(step.from.odom_from_base, step.to.odom_from_base);
   const auto& stated = step.to.twist_covariance;

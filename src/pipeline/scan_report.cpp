@@ -24,6 +24,18 @@ std::string toString(ScanOutcome outcome) {
   return "unknown";
 }
 
+std::string toString(HeadingUse use) {
+  switch (use) {
+    case HeadingUse::kNone:
+      return "none";
+    case HeadingUse::kUsed:
+      return "used";
+    case HeadingUse::kContradicts:
+      return "contradicts";
+  }
+  return "unknown";
+}
+
 bool wasUsed(ScanOutcome outcome) { return outcome == ScanOutcome::kUpdated || outcome == ScanOutcome::kSlip; }
 
 ScanReport notUsed(Stamp stamp, ScanOutcome outcome, const std::string& reason) {

@@ -144,6 +144,39 @@ OdometrySample moved(const OdometrySample& sample, const SE2& child_from_base) {
   return result;
 }
 
+std::optional<ImuSample> toImuSample(const sensor_msgs::Imu& message, const Eigen::Isometry3d& base_from_imu,
+                                     const ImuOptions& used, std::string* problem) {
+  ImuSample sample;
+  sample.stamp = toStamp(message.header.stamp);
+  std::ostringstream text;
+  const auto isGiven = [&text](const auto& covariance, const char* of) {
+    if (covariance[0] != -1.0) return true;
+    text << of << "_covariance[0] is -1, which says that it is not measured; ";
+    return false;
+  };
+  const auto& w = message.angular_velocity;
+  if (used.gyro && isGiven(message.angular_velocity_covariance, "angular_velocity")) {
+    const double yaw_rate = (base_from_imu.linear() * Eigen::Vector3d(w.x, w.y, w.z)).z();
+    if (std::isfinite(yaw_rate)) {
+      sample.yaw_rate = yaw_rate;
+    } else {
+      text << "angular_velocity (" << w.x << ", " << w.y << ", " << w.z << "): finite numbers expected; ";
+    }
+  }
+  if (used.orientation && isGiven(message.orientation_covariance, "orientation")) {
+    std::string quaternion_problem;
+    if (planar(0.0, 0.0, message.orientation, &quaternion_problem)) {
+      const Eigen::Quaterniond world_from_imu = toEigen(message.orientation).normalized();
+      sample.yaw = toPlanar(Eigen::Isometry3d(world_from_imu * base_from_imu.linear().transpose())).yaw;
+    } else {
+      text << quaternion_problem << "; ";
+    }
+  }
+  if (sample.yaw_rate || sample.yaw) return sample;
+  *problem = text.str().substr(0, text.str().size() - 2);
+  return std::nullopt;
+}
+
 std::string covarianceProblem(const MessageCovariance& covariance) {
   const Eigen::Matrix3d planar = toPlanarCovariance(covariance);
   if (isCovariance(planar)) return "";
@@ -248,6 +281,11 @@ sckf_odometry::Status toStatus(const ScanReport& report, const std::string& meth
   status.calibration_rotation_std = calibration_std(1);
   status.calibration_rotation_per_meter = report.calibration.error(2);
   status.calibration_rotation_per_meter_std = calibration_std(2);
+  status.gyro_bias = report.gyro_bias.value;
+  status.gyro_bias_std = std::sqrt(report.gyro_bias.variance);
+  status.gyro_time = report.gyro_time;
+  status.heading = toString(report.heading);
+  status.stands = report.stands;
   status.match_time = report.match_time;
   status.total_time = report.total_time;
   status.latency = now.toSec() - toTime(report.stamp).toSec();

@@ -1,6 +1,7 @@
 #include "sckf_odometry/ros/health.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <sstream>
 
@@ -13,6 +14,9 @@ using StatusWrapper = diagnostic_updater::DiagnosticStatusWrapper;
 
 /// A row of so many scans that did not correct the estimate is worth a warning.
 constexpr std::size_t kManyUnused = 10;
+
+/// Messages come in lumps: a shorter silence is none [s].
+constexpr double kShortestSilence = 0.5;
 
 void addEnds(const std::string& kind, const MessageTally& tally, StatusWrapper& status) {
   for (const auto& [how, count] : tally.ends()) status.add(kind + ": " + how, count);
@@ -53,6 +57,10 @@ void Health::scanTaken(const ScanReport& report) {
   if (!report.estimate) return;
   last_stamp_ = report.stamp;
   calibration_ = report.calibration;
+  gyro_bias_ = report.gyro_bias;
+  stands_ = report.stands;
+  if (report.heading == HeadingUse::kUsed) ++headings_used_;
+  if (report.heading == HeadingUse::kContradicts) ++headings_contradicting_;
   if (report.new_reference) reference_stamp_ = report.stamp;
   ++timed_;
   time_ += report.total_time;
@@ -80,8 +88,10 @@ std::vector<Health::Finding> Health::report(const Conditions& conditions, const 
   status.add("paused", conditions.paused);
   addScans(conditions, now, status);
   addOdometry(conditions, now, status);
+  if (options.pipeline.imu.isUsed()) addImu(conditions, now, status);
   addEstimate(conditions, status);
   slips_reported_ = slips_;
+  headings_contradicting_reported_ = headings_contradicting_;
   odometry_jumps_reported_ = odometry_jumps_before_ + conditions.odometry_jumps;
   return findings;
 }
@@ -118,6 +128,15 @@ std::vector<Health::Finding> Health::findings(const Conditions& conditions, cons
   if (odometry_jumps_before_ + conditions.odometry_jumps > odometry_jumps_reported_) {
     warn("odometry jump", "the odometry on " + odometry_source_ + " jumped: not taken for motion");
   }
+  const double imu_timeout = std::max(options.pipeline.imu.timeout, kShortestSilence);
+  const double imu_silence = imu.silence(now).value_or(0.0);
+  if (imu_silence > imu_timeout) {
+    warn("imu timeout", silenceOf("IMU", imu_silence, "imu_timeout", options.pipeline.imu.timeout) +
+                            ": the estimate goes on without it");
+  }
+  if (headings_contradicting_ > headings_contradicting_reported_) {
+    warn("heading", "the orientation of the IMU contradicts the estimate: not used");
+  }
   if (slips_ > slips_reported_) warn("slip", "the wheels slip: the scans are believed");
   return findings;
 }
@@ -149,12 +168,23 @@ void Health::addOdometry(const Conditions& conditions, const ros::Time& now, Sta
 void Health::addEstimate(const Conditions& conditions, StatusWrapper& status) const {
   status.add("wheels slip", slips_now_);
   status.add("wheel slips", slips_);
+  status.add("stands", stands_);
   status.addf("NIS", "%.3f", last_nis_);
   status.add("observed dimension", last_dimension_);
   addCalibration(status);
   if (reference_stamp_ == Stamp(0)) return;
   status.addf("reference age [s]", "%.3f",
               seconds(std::max(last_stamp_, conditions.newest_odometry) - reference_stamp_));
+}
+
+void Health::addImu(const Conditions& conditions, const ros::Time& now, StatusWrapper& status) {
+  status.add("imu: messages", imu.received());
+  addEnds("imu", imu, status);
+  status.add("imu: held back", conditions.imu_held_back);
+  addRecent("imu", imu.recent(now), status);
+  status.addf("gyro bias [rad/s]", "%.5f +- %.5f", gyro_bias_.value, std::sqrt(gyro_bias_.variance));
+  status.add("headings: used", headings_used_);
+  status.add("headings: contradicting", headings_contradicting_);
 }
 
 void Health::addCalibration(StatusWrapper& status) const {

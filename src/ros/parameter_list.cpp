@@ -82,12 +82,26 @@ List odometryParameters(PipelineOptions& pipeline) {
 /// Of a new estimate: they cannot change while there is one.
 List otherSensors(PipelineOptions& pipeline) {
   CalibrationOptions& calibration = pipeline.calibration;
+  ImuOptions& imu = pipeline.imu;
+  StandstillOptions& standstill = pipeline.standstill;
   return {
       flag("calibrate_odometry", calibration.on),
       number("calibration_distance_std", calibration.distance_std, aboveUpTo(0.0, 1.0)),
       number("calibration_rotation_std", calibration.rotation_std, aboveUpTo(0.0, 1.0)),
       number("calibration_rotation_per_meter_std", calibration.rotation_per_meter_std, aboveUpTo(0.0, 1.0), "rad/m"),
       number("calibration_way", calibration.way, within(0.1, 1e6), "m"),
+      flag("use_imu", imu.gyro),
+      number("gyro_noise", imu.gyro_noise, aboveUpTo(0.0, 10.0), "rad/s/sqrt(Hz)"),
+      number("gyro_bias_std", imu.gyro_bias_std, aboveUpTo(0.0, 10.0), "rad/s"),
+      number("gyro_bias_drift", imu.gyro_bias_drift, within(0.0, 10.0), "rad/s/sqrt(s)"),
+      flag("use_imu_orientation", imu.orientation),
+      number("imu_orientation_std", imu.orientation_std, aboveUpTo(0.0, 10.0), "rad"),
+      number("imu_heading_drift", imu.heading_drift, within(0.0, 10.0), "rad/sqrt(s)"),
+      number("imu_timeout", imu.timeout, within(0.001, 60.0), "s"),
+      number("standstill_time", standstill.time, within(0.0, 1e6), "s"),
+      number("standstill_speed", standstill.speed, within(0.0, 10.0), "m/s"),
+      number("standstill_yaw_rate", standstill.yaw_rate, within(0.0, 10.0), "rad/s"),
+      number("standstill_std", standstill.std, aboveUpTo(0.0, 10.0), "m/sqrt(s), rad/sqrt(s)"),
   };
 }
 

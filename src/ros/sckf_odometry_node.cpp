@@ -55,6 +55,7 @@ ScKfOdometryNode::ScKfOdometryNode(ros::NodeHandle nh, const ros::NodeHandle& pr
       health_(odometry_source_, scan_topic_),
       pose_keeper_(options_.node),
       gate_(options_.node, odometry_source_, scan_topic_, health_, warnings_),
+      imu_(options_.pipeline.imu, nh.resolveName("imu"), options_.node.time_jump, health_, warnings_),
       diagnostics_(nh, private_nh, private_nh.getNamespace()),
       services_(nh, private_nh, serviceActions()),
       reconfigure_(private_nh, options_, [this](const Options& options) { onOptions(options); }) {
@@ -83,6 +84,9 @@ void ScKfOdometryNode::subscribe(ros::NodeHandle& nh) {
   subscribeTf("/tf", false);
   if (!options_.node.use_tf_odometry) {
     subscribers_.push_back(nh.subscribe("odom", queue, &ScKfOdometryNode::onOdometry, this, hints));
+  }
+  if (options_.pipeline.imu.isUsed()) {
+    subscribers_.push_back(nh.subscribe("imu", queue, &ScKfOdometryNode::onImu, this, hints));
   }
   subscribers_.push_back(nh.subscribe("scan", queue, &ScKfOdometryNode::onScan, this, hints));
 }
@@ -136,6 +140,15 @@ void ScKfOdometryNode::onScan(const Scan& message) {
 
 void ScKfOdometryNode::onOdometry(const nav_msgs::Odometry::ConstPtr& message) {
   guarded([&] { addOdometry(gate_.admit(*message, options_.pipeline.prefer_twist_covariance, tf_)); });
+}
+
+void ScKfOdometryNode::onImu(const sensor_msgs::Imu::ConstPtr& message) {
+  guarded([&] {
+    for (const ImuSample& sample : imu_.admit(*message, gate_.newestOdometry(), tf_)) {
+      paused_ ? imu_.ended("paused") : imu_.ended(pipeline_->addImu(sample));
+    }
+    advance();
+  });
 }
 
 void ScKfOdometryNode::onTransforms(const ros::MessageEvent<const tf2_msgs::TFMessage>& event, bool is_static) {
@@ -247,6 +260,7 @@ void ScKfOdometryNode::followTime(Stamp jump) {
   ROS_WARN_STREAM_NAMED(kLogger, "time went back by " << -seconds(jump) << " s: the estimate starts again");
   begin(SE2(), Eigen::Matrix3d::Zero(), "dropped, time went back");
   gate_.restart();
+  imu_.restart();
   publisher_.restart();
   if (!options_.node.use_tf_odometry) tf_.clear();  // there it has noticed by itself, and has begun anew already
 }
@@ -308,6 +322,8 @@ std::string ScKfOdometryNode::waitingFor() const {
   if (health_.odometry.received() == 0) return "odometry on " + odometry_source_;
   if (!scans_without_mount_.empty()) return "the mount of the laser: " + mount_problem_;
   if (health_.scans.received() == 0) return "scans on " + scan_topic_;
+  if (options_.pipeline.imu.isUsed() && health_.imu.received() == 0) return "the IMU on " + imu_.topic();
+  if (!imu_.mountProblem().empty()) return "the mount of the IMU: " + imu_.mountProblem();
   return "";
 }
 
@@ -322,6 +338,7 @@ void ScKfOdometryNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& sta
     conditions.odometry_held_back = gate_.odometryHeldBack();
     conditions.scans_held_back = gate_.scansHeldBack();
     conditions.scans_without_mount = scans_without_mount_.size();
+    conditions.imu_held_back = imu_.heldBack();
     conditions.newest_odometry = gate_.newestOdometry();
     for (const Health::Finding& finding : health_.report(conditions, options_, ros::Time::now(), status)) {
       finding.level == Level::ERROR ? warnings_.error(finding.kind, finding.text)

@@ -30,6 +30,7 @@ struct Arguments {
   std::string method;
   std::string scan_topic = "/scan";
   std::string odom_topic = "/odom";
+  std::string imu_topic = "/imu";
 };
 
 /// A file that is complete or not there: it gets its name when everything has been written.
@@ -168,7 +169,8 @@ class Replay {
     } catch (const rosbag::BagException& exception) {
       throw std::runtime_error(arguments_.bag + ": " + exception.what());
     }
-    rosbag::View view(bag, rosbag::TopicQuery({"/tf", "/tf_static", arguments_.scan_topic, arguments_.odom_topic}));
+    rosbag::View view(bag, rosbag::TopicQuery({"/tf", "/tf_static", arguments_.scan_topic, arguments_.odom_topic,
+                                               arguments_.imu_topic}));
     const auto begin = std::chrono::steady_clock::now();
     ProgressBar progress(view.size());
     for (const rosbag::MessageInstance& message : view) {
@@ -198,6 +200,8 @@ class Replay {
       for (const OdometrySample& sample : tf_.takeOdometry()) pipeline_.addOdometry(sample);
     } else if (const auto odometry = message.instantiate<nav_msgs::Odometry>()) {
       addOdometry(*odometry);
+    } else if (const auto imu = message.instantiate<sensor_msgs::Imu>()) {
+      addImu(*imu);
     } else if (const auto scan = message.instantiate<sensor_msgs::LaserScan>()) {
       ++scans_;
       waiting_.push_back(scan);
@@ -215,6 +219,18 @@ class Replay {
       pipeline_.addOdometry(*sample);
     } else {
       std::fprintf(stderr, "odometry at %.9f not used: %s\n", message.header.stamp.toSec(), problem.c_str());
+    }
+  }
+
+  void addImu(const sensor_msgs::Imu& message) {
+    if (!options_.pipeline.imu.isUsed()) return;
+    std::string problem;
+    const auto mount = tf_.baseFrom(frameName(message.header.frame_id), &problem);
+    const auto sample = mount ? toImuSample(message, *mount, options_.pipeline.imu, &problem) : std::nullopt;
+    if (sample) {
+      pipeline_.addImu(*sample);
+    } else {
+      std::fprintf(stderr, "IMU at %.9f not used: %s\n", message.header.stamp.toSec(), problem.c_str());
     }
   }
 
@@ -263,7 +279,8 @@ std::optional<Arguments> parse(int argc, char** argv) {
     ("params", po::value(&arguments.params), "parameter file, as config/sckf_odometry.yaml")
     ("method", po::value(&arguments.method), "instead of the parameter file's method")
     ("scan-topic", po::value(&arguments.scan_topic)->default_value(arguments.scan_topic), "")
-    ("odom-topic", po::value(&arguments.odom_topic)->default_value(arguments.odom_topic), "");
+    ("odom-topic", po::value(&arguments.odom_topic)->default_value(arguments.odom_topic), "")
+    ("imu-topic", po::value(&arguments.imu_topic)->default_value(arguments.imu_topic), "with the parameter use_imu");
   // clang-format on
   po::options_description all(shown);
   all.add_options()("bag", po::value(&arguments.bag));

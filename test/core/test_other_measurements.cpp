@@ -223,8 +223,8 @@ class Robot {
       sums.calibration[at] += nees(calibration_ - calibration.error, calibration.covariance);
       sums.squared_calibration[at] += std::pow(calibration_(0) - calibration.error(0), 2) / kRuns;
     }
-    if (filter_.gyroBiasVariance() > 0.0) {
-      sums.bias[at] += std::pow(bias_ - filter_.gyroBias(), 2) / filter_.gyroBiasVariance() / kRuns;
+    if (filter_.gyroBias().variance > 0.0) {
+      sums.bias[at] += std::pow(bias_ - filter_.gyroBias().value, 2) / filter_.gyroBias().variance / kRuns;
     }
   }
 
@@ -334,7 +334,7 @@ TEST(OtherMeasurements, WheelsThatSlipAreNotBelievedAgainstTheGyro) {
   const OdometryIncrement refined = filter.refined(slip);
   filter.propagate(slip);
   EXPECT_NEAR(filter.pose().yaw, 0.01, 0.005);
-  EXPECT_NEAR(filter.gyroBias(), 0.0, 0.003);
+  EXPECT_NEAR(filter.gyroBias().value, 0.0, 0.003);
   EXPECT_NEAR(refined.before_from_after.yaw, filter.pose().yaw, 1e-9) << "what is published in between agrees";
 }
 

@@ -2,7 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "pipeline/simulated_drive.h"
 
@@ -77,13 +82,212 @@ TEST(OtherSensors, ACalibrationThatIsOffIsNone) {
 TEST(OtherSensors, MethodsWithoutSuchStatesRefuseThemByName) {
   for (const std::string& method : fusionMethodNames()) {
     PipelineOptions options = withMethod(method);
-    options.calibration.on = true;
-    if (method == "sckf_multi") {
-      EXPECT_NO_THROW(ScanOdometry{options});
-    } else {
-      expectRefused(options, "calibrate_odometry");
+    const std::vector<std::pair<std::string, bool*>> switches{{"calibrate_odometry", &options.calibration.on},
+                                                              {"use_imu", &options.imu.gyro},
+                                                              {"use_imu_orientation", &options.imu.orientation}};
+    for (const auto& [parameter, is_on] : switches) {
+      *is_on = true;
+      if (method == "sckf_multi") {
+        EXPECT_NO_THROW(ScanOdometry{options});
+      } else {
+        expectRefused(options, parameter);
+      }
+      *is_on = false;
     }
   }
+}
+
+// ---- gyro and orientation
+
+/// An IMU at 100 Hz whose gyro has a bias, and whose world is turned; its messages come a little later than their
+/// stamps.
+struct SimulatedImu {
+  const SimulatedDrive& drive;
+  double bias = 0.03;   // [rad/s]
+  double turned = 2.0;  // [rad]
+  int delay = 15;       // [ms]
+  int silent_from = 1000000;
+
+  ImuSample at(int ms) const {
+    const double h = 1e-3;
+    const double rate = between(drive.truth(ms - 1), drive.truth(ms + 1)).yaw / (2.0 * h);
+    return {test::at(ms), rate + bias, wrapAngle(drive.truth(ms).yaw + turned)};
+  }
+
+  /// Odometry at 50 Hz, scans at 10 Hz (or none), and the IMU, over (from, to].
+  void run(Driven& driven, int from, int to, bool scans = true) const {
+    for (int ms = from + 1; ms <= to; ++ms) {
+      const int stamp = ms - delay;
+      if (stamp % 10 == 0 && stamp > 0 && stamp < silent_from) driven.pipeline.addImu(at(stamp));
+      if (ms % 20 == 0) driven.odometry(ms);
+      if (scans && ms % 100 == 7) driven.scan(ms);
+      driven.process();
+    }
+  }
+};
+
+Wheels turningWrongly() {
+  Wheels wheels;
+  wheels.scale = 1.0;
+  wheels.yaw_per_meter = 0.3;
+  return wheels;
+}
+
+PipelineOptions withGyro() {
+  PipelineOptions options;
+  options.imu.gyro = true;
+  options.imu.gyro_noise = 0.001;
+  options.imu.gyro_bias_std = 0.05;
+  return options;
+}
+
+/// The error of the yaw after 6 s without scans.
+double yawErrorWithoutScans(const SimulatedDrive& drive, const SimulatedImu& imu, const PipelineOptions& options) {
+  Driven driven(drive, options);
+  driven.odometry(0);
+  imu.run(driven, 0, 10000);
+  const double before = driven.latestError(10000).z();
+  imu.run(driven, 10000, 16000, false);
+  return std::abs(wrapAngle(driven.latestError(16000).z() - before));
+}
+
+TEST(OtherSensors, AGyroHoldsTheHeadingWhereWheelsAndScansDoNot) {
+  const SimulatedDrive drive(turningWrongly(), 18000);
+  const SimulatedImu imu{drive};
+  const double without = yawErrorWithoutScans(drive, imu, {});
+  const double with = yawErrorWithoutScans(drive, imu, withGyro());
+  EXPECT_GT(without, 0.5) << "the drive is no test: the wheels are good enough";
+  EXPECT_LT(with, 0.05);
+}
+
+TEST(OtherSensors, TheBiasOfTheGyroIsFound) {
+  const SimulatedDrive drive(turningWrongly(), 18000);
+  const SimulatedImu imu{drive};
+  Driven driven(drive, withGyro());
+  driven.odometry(0);
+  imu.run(driven, 0, 10000);
+  const ScanReport& last = driven.reports.back();
+  EXPECT_NEAR(last.gyro_bias.value, imu.bias, 3.0 * std::sqrt(last.gyro_bias.variance));
+  EXPECT_NEAR(last.gyro_bias.value, imu.bias, 0.01);
+  EXPECT_NEAR(last.gyro_time, 0.1, 1e-9) << "every scan waits until the gyro tells all";
+  expectAccurate(drive, driven);
+}
+
+TEST(OtherSensors, AGyroThatFallsSilentIsNotWaitedFor) {
+  const SimulatedDrive drive(turningWrongly(), 18000);
+  SimulatedImu imu{drive};
+  imu.silent_from = 3000;
+  Driven driven(drive, withGyro());
+  driven.odometry(0);
+  imu.run(driven, 0, 10000);
+  EXPECT_EQ(driven.reports.size(), 100U);
+  EXPECT_EQ(driven.reports.back().gyro_time, 0.0);
+  EXPECT_LE(driven.pipeline.waitingScans(), 1U);
+  expectAccurate(drive, driven);
+}
+
+TEST(OtherSensors, WhenReadingsOfTheGyroComeMakesNoDifference) {
+  const SimulatedDrive drive(turningWrongly(), 18000);
+  SimulatedImu early{drive};
+  early.delay = 0;
+  SimulatedImu late{drive};
+  late.delay = 70;
+  Driven a(drive, withGyro());
+  Driven b(drive, withGyro());
+  a.odometry(0);
+  b.odometry(0);
+  a.pipeline.addImu(early.at(1));  // before the first scan both have to tell all
+  b.pipeline.addImu(early.at(1));
+  early.run(a, 0, 5000);
+  late.run(b, 0, 5100);
+  ASSERT_GE(b.reports.size(), a.reports.size());
+  for (std::size_t i = 0; i < a.reports.size(); ++i) {
+    expectNear(a.reports[i].estimate.value(), b.reports[i].estimate.value(), 0.0);
+  }
+}
+
+TEST(OtherSensors, AHeadingHoldsTheYawWhereWheelsAndScansDoNot) {
+  const SimulatedDrive drive(turningWrongly(), 18000);
+  const SimulatedImu imu{drive};
+  PipelineOptions options;
+  options.imu.orientation = true;
+  options.imu.orientation_std = 0.01;
+  options.imu.heading_drift = 0.0005;
+  options.scan.min_points = 1000;  // no scan can be used
+  Driven driven(drive, options);
+  driven.odometry(0);
+  imu.run(driven, 0, 10000);
+  EXPECT_EQ(driven.count(ScanOutcome::kUnusable), driven.reports.size());
+  EXPECT_EQ(driven.reports.back().heading, HeadingUse::kUsed);
+  EXPECT_LT(std::abs(driven.reports.back().estimate->odom_from_base.yaw - drive.truth(9907).yaw), 0.05);
+}
+
+TEST(OtherSensors, AHeadingThatContradictsIsNotUsed) {
+  const SimulatedDrive drive;
+  SimulatedImu imu{drive};
+  PipelineOptions options;
+  options.imu.orientation = true;
+  options.imu.orientation_std = 0.01;
+  Driven driven(drive, options);
+  driven.odometry(0);
+  imu.run(driven, 0, 2000);
+  imu.turned += 1.0;
+  imu.run(driven, 2000, 3000);
+  EXPECT_EQ(driven.reports.back().heading, HeadingUse::kContradicts);
+  expectAccurate(drive, driven);
+}
+
+// ---- standstill
+
+/// Encoders of a robot that stands tell of motion now and then.
+OdometrySample jitter(int ms, double size) {
+  OdometrySample sample;
+  sample.stamp = at(ms);
+  const int n = ms / 20;
+  sample.odom_from_base = SE2(size * (n % 2), 0.0, size * (n / 2 % 2));
+  return sample;
+}
+
+Eigen::Matrix3d covarianceAfterStanding(const PipelineOptions& options, double size) {
+  ScanOdometry pipeline(options);
+  for (int ms = 0; ms <= 20000; ms += 20) pipeline.addOdometry(jitter(ms, size));
+  return pipeline.latest()->covariance;
+}
+
+TEST(OtherSensors, ARobotThatStandsKnowsIt) {
+  PipelineOptions options;
+  const Eigen::Matrix3d without = covarianceAfterStanding(options, 1e-4);
+  options.standstill.time = 1.0;
+  const Eigen::Matrix3d with = covarianceAfterStanding(options, 1e-4);
+  EXPECT_LT(with.trace(), 0.2 * without.trace());
+  const double bound = 20.0 * options.standstill.std * options.standstill.std;
+  const Eigen::Matrix3d first_second = covarianceAfterStanding({}, 1e-4) / 20.0;
+  EXPECT_LT(with(0, 0), 1.2 * (bound + first_second(0, 0)));
+  const Eigen::Matrix3d faster = covarianceAfterStanding(options, 1e-3);  // 0.05 m/s
+  EXPECT_TRUE(matricesNear(faster, covarianceAfterStanding({}, 1e-3), 0.0)) << "no standstill";
+}
+
+TEST(OtherSensors, TheBiasOfAGyroIsFoundWhileTheRobotStands) {
+  PipelineOptions options = withGyro();
+  options.standstill.time = 0.5;
+  ScanOdometry pipeline(options);
+  const SimulatedDrive drive;
+  std::vector<ScanReport> reports;
+  for (int ms = 0; ms <= 8000; ms += 10) {
+    pipeline.addImu({at(ms), 0.03, {}});
+    if (ms % 20 == 0) pipeline.addOdometry(jitter(ms, 1e-4));
+    if (ms % 200 == 10) {
+      LaserScan blind = drive.scan(0);
+      blind.stamp = at(ms);
+      std::fill(blind.ranges.begin(), blind.ranges.end(), 0.0F);
+      pipeline.addScan(blind, drive.laser.base_from_laser);
+    }
+    for (ScanReport& report : pipeline.process()) reports.push_back(std::move(report));
+  }
+  EXPECT_FALSE(reports.front().stands);
+  EXPECT_TRUE(reports.back().stands);
+  EXPECT_NEAR(reports.back().gyro_bias.value, 0.03, 0.003);
+  EXPECT_LT(std::sqrt(reports.back().gyro_bias.variance), 0.005);
 }
 
 }  // namespace

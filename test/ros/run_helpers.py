@@ -15,7 +15,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry, Path
 from rosgraph_msgs.msg import Log
 from sckf_odometry.msg import Status
-from sensor_msgs.msg import LaserScan, PointCloud2
+from sensor_msgs.msg import Imu, LaserScan, PointCloud2
 from tf2_msgs.msg import TFMessage
 
 TIMEOUT = 300.0  # [s] of wall time for whatever is waited for: machines can be slow
@@ -178,7 +178,8 @@ class Feeder:
     """Publishes messages as a robot would, in the order given, some times faster than their stamps say."""
 
     def __init__(self, topics):
-        kinds = {'odom': Odometry, 'scan': LaserScan, 'tf_static': TFMessage, 'tf': TFMessage}
+        kinds = {'odom': Odometry, 'scan': LaserScan, 'tf_static': TFMessage, 'tf': TFMessage, 'imu': Imu,
+                 'pose_update': PoseWithCovarianceStamped}
         self._publishers = {
             topic: rospy.Publisher(topic, kinds[topic.split('/')[-1]], queue_size=None, latch=topic == '/tf_static',
                                    tcp_nodelay=True)

@@ -12,11 +12,12 @@ import rosbag
 import rospy
 from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import LaserScan
+from sensor_msgs.msg import Imu, LaserScan
 from tf2_msgs.msg import TFMessage
 
 START = 1000.0  # [s], time of the first message
 ODOMETRY_RATE = 20.0  # [1/s]
+IMU_RATE = 100.0  # [1/s]
 SCAN_PERIOD = 0.23  # [s]: no multiple of that of the odometry, so that odometry has to be interpolated
 
 # A room with a niche, two boxes and a slanted wall: no two views of it are alike.
@@ -133,14 +134,43 @@ def scan_message(stamp, pose, mount, segments, rng, beams=360, noise=0.01):
     return message
 
 
-def mount_message(stamp, mount):
-    transform = TransformStamped()
-    transform.header.stamp = stamp
-    transform.header.frame_id, transform.child_frame_id = 'base_link', mount.frame
-    t, r = transform.transform.translation, transform.transform.rotation
-    t.x, t.y, t.z = mount.x, mount.y, mount.z
-    r.x, r.y, r.z, r.w = mount.quaternion()
-    return TFMessage([transform])
+def multiply(p, q):
+    """Of quaternions x, y, z, w."""
+    (a, b, c, d), (x, y, z, w) = p, q
+    return (d * x + a * w + b * z - c * y, d * y - a * z + b * w + c * x, d * z + a * y - b * x + c * w,
+            d * w - a * x - b * y - c * z)
+
+
+class ImuUnit:
+    """An IMU, upside down, whose gyro has a bias [rad/s] and whose world is turned [rad]."""
+
+    def __init__(self, bias=0.02, turned=2.0, noise=0.005):
+        self.bias, self.turned, self.noise = bias, turned, noise
+        self.mount = Mount(x=-0.1, z=0.5, yaw=0.4, upside_down=True, frame='imu_link')
+
+    def message(self, t, rng):
+        """Of t seconds after the start. The noise is that of the yaw rate [rad/s] and, as large, of the yaw [rad]."""
+        message = Imu()
+        message.header.stamp, message.header.frame_id = rospy.Time.from_sec(START + t), self.mount.frame
+        rate = between(truth(t - 1e-3), truth(t + 1e-3))[2] / 2e-3 + self.bias + self.noise * rng.normal()
+        message.angular_velocity.z = -rate  # upside down
+        yaw = truth(t)[2] + self.turned + self.noise * rng.normal()
+        q = message.orientation
+        q.x, q.y, q.z, q.w = multiply((0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)), self.mount.quaternion())
+        return message
+
+
+def mount_message(stamp, *mounts):
+    transforms = []
+    for mount in mounts:
+        transform = TransformStamped()
+        transform.header.stamp = stamp
+        transform.header.frame_id, transform.child_frame_id = 'base_link', mount.frame
+        t, r = transform.transform.translation, transform.transform.rotation
+        t.x, t.y, t.z = mount.x, mount.y, mount.z
+        r.x, r.y, r.z, r.w = mount.quaternion()
+        transforms.append(transform)
+    return TFMessage(transforms)
 
 
 def true_trajectory(stamps):
@@ -148,12 +178,13 @@ def true_trajectory(stamps):
     return np.array([between(truth(0.0), truth(stamp - START)) for stamp in stamps])
 
 
-def messages(duration=45.0, mount=None, seed=1, beams=360):
-    """(topic, message, stamp) in the order of time."""
+def messages(duration=45.0, mount=None, seed=1, beams=360, imu=None):
+    """(topic, message, stamp) in the order of time; with an ImuUnit its messages at IMU_RATE, too."""
     mount = mount or Mount(x=0.2)
     rng = np.random.default_rng(seed)
     segments = walls()
-    out = [('/tf_static', mount_message(rospy.Time.from_sec(START), mount), START)]
+    mounts = [mount, imu.mount] if imu else [mount]
+    out = [('/tf_static', mount_message(rospy.Time.from_sec(START), *mounts), START)]
     for i, pose in enumerate(odometry(duration, rng)):
         stamp = START + i / ODOMETRY_RATE
         out.append(('/odom', odometry_message(rospy.Time.from_sec(stamp), pose), stamp))
@@ -162,6 +193,9 @@ def messages(duration=45.0, mount=None, seed=1, beams=360):
         scan = scan_message(rospy.Time.from_sec(START + t), truth(t), mount, segments, rng, beams)
         out.append(('/scan', scan, START + t))
         t += SCAN_PERIOD
+    if imu:
+        stamps = np.arange(int(duration * IMU_RATE)) / IMU_RATE
+        out += [('/imu', imu.message(t, rng), START + t) for t in stamps]
     return sorted(out, key=lambda entry: entry[2])
 
 

@@ -40,6 +40,12 @@ struct WheelCalibration {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of what `error` errs by
 };
 
+/// What a gyro tells of a robot that does not turn.
+struct GyroBias {
+  double value = 0.0;     ///< [rad/s]
+  double variance = 0.0;  ///< of what it errs by; zero: it is not estimated
+};
+
 /// States beside the pose that are not cloned (III-F). Where a standard deviation is zero there is no such state.
 struct StateOptions {
   /// Of s, r and k of WheelCalibration: how large they can be [1, 1, rad/m]. They are taken for stationary processes,
@@ -84,6 +90,14 @@ class FusionMethod {
   /// What the increment is with all that is known of the wheels and all that is measured of the motion.
   virtual OdometryIncrement refined(const OdometryIncrement& increment) const { return increment; }
   virtual WheelCalibration calibration() const { return {}; }
+  virtual GyroBias gyroBias() const { return {}; }
+
+  /// Time passes: for what drifts with it. [s]
+  virtual void age(double /*dt*/) {}
+
+  /// yaw: of base_link in the frame of a compass or an IMU, whose own yaw in the world is estimated. variance [rad²].
+  /// Returns the innovation, normalised and squared; beyond the bound it corrects nothing.
+  virtual double updateHeading(double /*yaw*/, double /*variance*/, double /*nis_bound*/) { return 0.0; }
 
   /// The methods of the paper have one clone, which clone() replaces. Others have several, the newest number 0, and any
   /// of them can be the reference of a displacement.

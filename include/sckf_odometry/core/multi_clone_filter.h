@@ -27,8 +27,7 @@ class MultiCloneFilter : public FusionMethod {
   Eigen::Matrix3d covariance() const override;
   SE2 clonedPose(std::size_t clone) const { return inWorld(clones_[clone].pose); }
   WheelCalibration calibration() const override;
-  double gyroBias() const { return gyro_bias_; }  ///< [rad/s]
-  double gyroBiasVariance() const { return varianceOf(gyro_bias_error_); }
+  GyroBias gyroBias() const override { return {gyro_bias_, varianceOf(gyro_bias_error_)}; }
 
   void propagate(const OdometryIncrement& increment) override;
   OdometryIncrement refined(const OdometryIncrement& increment) const override;
@@ -44,10 +43,8 @@ class MultiCloneFilter : public FusionMethod {
   /// Measurements that are no displacements (V-A): all states are corrected, unless the innovation, normalised and
   /// squared, exceeds a bound. Returns it.
   double update(const PoseMeasurement& measurement, double nis_bound);
-  /// yaw: of base_link in the frame of a compass or an IMU, whose own yaw in the world is estimated. variance [rad²]
-  double updateHeading(double yaw, double variance, double nis_bound);
-  /// Time passes: for what drifts with it. [s]
-  void age(double dt);
+  double updateHeading(double yaw, double variance, double nis_bound) override;
+  void age(double dt) override;
 
   /// The same robot in another world, of which only the pose there is known, to a covariance.
   void enterWorld(const PoseMeasurement& world_from_base);

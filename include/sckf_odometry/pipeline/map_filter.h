@@ -2,7 +2,8 @@
 #pragma once
 
 #include <memory>
-#include <optional>
+#include <string>
+#include <utility>
 
 #include "sckf_odometry/core/multi_clone_filter.h"
 
@@ -11,7 +12,6 @@ namespace sckf {
 /// Absolute poses of the robot, told by amcl, a marker, motion capture.
 struct PoseUpdateOptions {
   bool on = false;
-  double delay = 1.0;     ///< [s] for which a pose waits for scans that are older, and by which it may come late
   int max_rejected = 10;  ///< so many poses in a row that contradict the estimate make it begin anew at the last one
 };
 
@@ -20,7 +20,10 @@ enum class PoseOutcome {
   kEntered,      ///< the first one, or after too many that contradicted: the estimate in map begins there
   kUsed,         ///< it corrected the estimate in map
   kContradicts,  ///< it contradicts the estimate beyond the gate: not used
+  kTooLate,      ///< its time is past, and forgotten: not used
+  kNoOdometry,   ///< no odometry came for its stamp: not used
 };
+std::string toString(PoseOutcome outcome);
 
 /// Two filters that take the same motion and the same displacements. What FusionMethod tells is of the one in odom,
 /// which stays as it would be without absolute poses: its estimate never jumps. The other one begins as its copy, put

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "sckf_odometry/core/fusion_method.h"
+#include "sckf_odometry/pipeline/standstill.h"
 
 namespace sckf {
 
@@ -15,7 +16,27 @@ struct CalibrationOptions {
   double way = 100.0;                    ///< [m] within which they are forgotten
 };
 
+/// What an IMU is used for, and how far it is trusted.
+struct ImuOptions {
+  bool gyro = false;                ///< its yaw rate …
+  double gyro_noise = 0.005;        ///< [rad/s/√Hz] with this noise …
+  double gyro_bias_std = 0.02;      ///< [rad/s] and a bias that may be as large at the start …
+  double gyro_bias_drift = 0.0005;  ///< [rad/s/√s] … and wanders
+  bool orientation = false;         ///< its yaw in a world of its own, at the scans …
+  double orientation_std = 0.05;    ///< [rad] with this noise …
+  double heading_drift = 0.005;     ///< [rad/√s] … while the two worlds come apart
+  double timeout = 0.5;             ///< [s] an IMU that tells nothing for longer is silent: nobody waits for it
+
+  bool isUsed() const { return gyro || orientation; }
+};
+
 /// The states that the filter has for what is on.
-StateOptions statesFor(const CalibrationOptions& calibration);
+StateOptions statesFor(const CalibrationOptions& calibration, const ImuOptions& imu);
+
+/// The rotation in dt [s] as a gyro tells it, for an increment of which others tell this much.
+MotionMeasurement gyroMeasurement(double rotation, double yaw_of_increment, double dt, const ImuOptions& options);
+
+/// A robot that stands, for dt [s].
+MotionMeasurement standstillMeasurement(double dt, const StandstillOptions& options);
 
 }  // namespace sckf

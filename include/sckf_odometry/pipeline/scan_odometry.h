@@ -11,6 +11,7 @@
 #include "sckf_odometry/core/dead_reckoning.h"
 #include "sckf_odometry/core/fusion_method.h"
 #include "sckf_odometry/matching/scan_matcher.h"
+#include "sckf_odometry/pipeline/imu_buffer.h"
 #include "sckf_odometry/pipeline/odometry_buffer.h"
 #include "sckf_odometry/pipeline/other_sensors.h"
 #include "sckf_odometry/pipeline/reference_policy.h"
@@ -35,6 +36,8 @@ struct PipelineOptions {
   std::string method = "sckf_multi";  ///< one of fusionMethodNames()
   OdometryNoise odometry_noise;
   CalibrationOptions calibration;
+  ImuOptions imu;
+  StandstillOptions standstill;
   bool prefer_twist_covariance = false;  ///< use the twist covariance of the odometry message where it is sensible
   ScanOptions scan;
   MatcherOptions matcher;
@@ -61,7 +64,12 @@ class ScanOdometry {
   /// options.motion.
   OdometryBuffer::Insertion addOdometry(const OdometrySample& sample);
 
-  /// The scan waits until odometry brackets its stamp, or until the wheels are silent and scans may carry on alone.
+  /// Readings may come in any order as long as they are newer than the last scan taken. A step of the odometry that
+  /// they do not cover wholly is not measured by them.
+  ImuBuffer::Insertion addImu(const ImuSample& sample) { return imu_.insert(sample); }
+
+  /// The scan waits until odometry brackets its stamp, or until the wheels are silent and scans may carry on alone;
+  /// for an IMU that is not silent it waits, too.
   /// base_from_laser: the mount at the time of the scan.
   void addScan(LaserScan scan, const Eigen::Isometry3d& base_from_laser);
 
@@ -98,7 +106,10 @@ class ScanOdometry {
   double gate(const Displacement& displacement) const;  ///< a larger innovation, normalised and squared, contradicts
   bool looksLikeSlip(const Match& match) const;
   void propagateTo(Stamp stamp);
+  void useHeading(ScanReport& report);
   void carryOn();
+  bool imuTells(Stamp stamp) const;
+  Stamp settled() const;
 
   bool wheelsAreSilent() const;
   bool bridgeTo(Stamp stamp);
@@ -106,13 +117,15 @@ class ScanOdometry {
   void followScans(Stamp since, const DisplacementPrediction& at_since, const ScanReport& report);
   MotionGuess guess() const;
 
-  OdometryIncrement increment(const OdometryBuffer::Step& step) const;
+  OdometryIncrement byWheels(const OdometryBuffer::Step& step) const;
+  OdometryIncrement increment(const OdometryBuffer::Step& step, Standstill& standstill) const;
   Estimate estimate() const;
 
   PipelineOptions options_;
   ScanMatcher matcher_;
   ReferencePolicy reference_policy_;
   OdometryBuffer odometry_;
+  ImuBuffer imu_;
   TwistWindow twist_;
   WaitingScans waiting_;
   std::vector<ScanReport> given_up_;
@@ -124,9 +137,14 @@ class ScanOdometry {
   std::unique_ptr<FusionMethod> filter_;  // at filter_stamp_; null before the first odometry
   Stamp filter_stamp_{0};
   bool wheels_known_ = true;  // since the last scan
+  double gyro_time_ = 0.0;    // [s] measured by a gyro, since then
+  Standstill standstill_;     // up to filter_stamp_
   ReferenceScans references_;
-  std::optional<DeadReckoning> carried_on_;  // the estimate, from filter_stamp_ on by the wheels to carried_on_stamp_
+  std::optional<DeadReckoning> carried_on_;  // the estimate, from filter_stamp_ on by the wheels to carried_on_stamp_ …
   Stamp carried_on_stamp_{0};
+  Standstill carried_on_standstill_;
+  std::optional<DeadReckoning> latest_;  // … and further, to latest_stamp_, which the IMU may yet tell more of
+  Stamp latest_stamp_{0};
 };
 
 }  // namespace sckf

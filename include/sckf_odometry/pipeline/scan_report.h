@@ -34,6 +34,14 @@ std::string toString(ScanOutcome outcome);
 /// Its displacement corrected the estimate.
 bool wasUsed(ScanOutcome outcome);
 
+/// What became of a heading.
+enum class HeadingUse {
+  kNone,         ///< there is none
+  kUsed,         ///< it corrected the estimate, or, the first one, told how the IMU's world is turned
+  kContradicts,  ///< it contradicts the estimate beyond the gate
+};
+std::string toString(HeadingUse use);
+
 struct ScanReport {
   Stamp stamp{0};
   ScanOutcome outcome = ScanOutcome::kReference;
@@ -48,6 +56,10 @@ struct ScanReport {
   int older_references = 0;                  ///< so many more references corrected the estimate
   bool wheels_known = true;                  ///< false: wheels did not tell all of the motion since the scan before
   WheelCalibration calibration;              ///< then; its covariance is zero if it is not estimated
+  GyroBias gyro_bias;                        ///< then; its variance is zero if it is not estimated
+  double gyro_time = 0.0;                    ///< [s] since the estimate before, that the gyro has measured
+  HeadingUse heading = HeadingUse::kNone;    ///< of the IMU, at the scan's stamp
+  bool stands = false;                       ///< the wheels have told of no motion for some time
   double match_time = 0.0;                   ///< [s] spent on the comparison with the reference …
   double total_time = 0.0;                   ///< [s] … and on the scan on the whole
   std::shared_ptr<const PreparedScan> scan;  ///< its points in base_link; null if it was not used

@@ -5,6 +5,7 @@
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <geometry_msgs/TransformStamped.h>
 #include <nav_msgs/Odometry.h>
+#include <sensor_msgs/Imu.h>
 #include <sensor_msgs/LaserScan.h>
 #include <sensor_msgs/PointCloud2.h>
 
@@ -47,6 +48,11 @@ std::optional<OdometrySample> toOdometrySample(const nav_msgs::Odometry& message
 /// The same for another frame fixed to the robot, odom_from_base = odom_from_child ⊕ child_from_base; the twist
 /// covariance with it.
 OdometrySample moved(const OdometrySample& sample, const SE2& child_from_base);
+
+/// What is used of an IMU's message, of base_link, which lies in the plane. A covariance that begins with -1 says that
+/// there is no such reading (REP-145). Empty, with the problem in words, if there is none that is used.
+std::optional<ImuSample> toImuSample(const sensor_msgs::Imu& message, const Eigen::Isometry3d& base_from_imu,
+                                     const ImuOptions& used, std::string* problem);
 
 /// What is wrong with a covariance of six axes in the plane, in words: value and what is expected; empty if nothing is.
 /// Zero is allowed.

@@ -23,7 +23,8 @@ class Health {
     std::size_t odometry_held_back = 0;  ///< until the next stamps tell whether time has jumped
     std::size_t scans_held_back = 0;
     std::size_t scans_without_mount = 0;  ///< that wait for the transform to their laser
-    Stamp newest_odometry{0};             ///< stamp
+    std::size_t imu_held_back = 0;
+    Stamp newest_odometry{0};  ///< stamp
   };
 
   /// What is not as it should be.
@@ -38,6 +39,7 @@ class Health {
 
   MessageTally odometry;
   MessageTally scans;
+  MessageTally imu;  ///< if it is used
 
   /// The scan went to the pipeline, and will be reported, unless the pipeline is dropped before.
   void scanPassed() { ++scans_in_pipeline_; }
@@ -58,6 +60,7 @@ class Health {
   void addOdometry(const Conditions& conditions, const ros::Time& now,
                    diagnostic_updater::DiagnosticStatusWrapper& status);
   void addEstimate(const Conditions& conditions, diagnostic_updater::DiagnosticStatusWrapper& status) const;
+  void addImu(const Conditions& conditions, const ros::Time& now, diagnostic_updater::DiagnosticStatusWrapper& status);
   void addCalibration(diagnostic_updater::DiagnosticStatusWrapper& status) const;
 
   std::string odometry_source_;
@@ -72,6 +75,11 @@ class Health {
   double last_nis_ = 0.0;
   Stamp reference_stamp_{0};
   Stamp last_stamp_{0};
+  GyroBias gyro_bias_;
+  std::size_t headings_used_ = 0;
+  std::size_t headings_contradicting_ = 0;
+  std::size_t headings_contradicting_reported_ = 0;
+  bool stands_ = false;
   WheelCalibration calibration_;  // covariance zero: not estimated
   std::size_t slips_ = 0;
   std::size_t slips_reported_ = 0;

@@ -7,6 +7,7 @@
 #include <ros/node_handle.h>
 #include <ros/subscriber.h>
 #include <ros/wall_timer.h>
+#include <sensor_msgs/Imu.h>
 #include <sensor_msgs/LaserScan.h>
 #include <tf2_msgs/TFMessage.h>
 
@@ -20,6 +21,7 @@
 #include "sckf_odometry/ros/debug_view.h"
 #include "sckf_odometry/ros/estimate_publisher.h"
 #include "sckf_odometry/ros/health.h"
+#include "sckf_odometry/ros/imu_input.h"
 #include "sckf_odometry/ros/input_gate.h"
 #include "sckf_odometry/ros/parameters.h"
 #include "sckf_odometry/ros/reconfigure.h"
@@ -30,8 +32,9 @@
 
 namespace sckf {
 
-/// Subscribes to scan and odom (nav_msgs/Odometry) or TF, publishes what EstimatePublisher and DebugView say, status
-/// and diagnostics, and serves what Services and Reconfigure say. Its callbacks may come from any number of threads.
+/// Subscribes to scan, to odom (nav_msgs/Odometry) or TF and, if asked for, to imu, publishes what EstimatePublisher
+/// and DebugView say, status and diagnostics, and serves what Services and Reconfigure say. Its callbacks may come from
+/// any number of threads.
 class ScKfOdometryNode {
  public:
   /// Throws std::invalid_argument if a parameter is bad: parameter, value, what is allowed.
@@ -48,6 +51,7 @@ class ScKfOdometryNode {
   Services::Actions serviceActions();
 
   void onScan(const Scan& message);
+  void onImu(const sensor_msgs::Imu::ConstPtr& message);
   void onOdometry(const nav_msgs::Odometry::ConstPtr& message);
   void onTransforms(const ros::MessageEvent<const tf2_msgs::TFMessage>& event, bool is_static);
   void onOptions(const Options& options);
@@ -90,6 +94,7 @@ class ScKfOdometryNode {
   Health health_;
   PoseKeeper pose_keeper_;
   InputGate gate_;
+  ImuInput imu_;
   std::deque<Scan> scans_without_mount_;
   std::string mount_problem_;  // of the newest scan that waits for its mount
   bool paused_ = false;
