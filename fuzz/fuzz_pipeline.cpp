@@ -81,6 +81,8 @@ PipelineOptions options(Bytes& bytes) {
   options.odometry_timeout = 0.1 * (1 + bytes.upTo(19));
   options.reference.kf_dist_linear = 0.5 * bytes.upTo(2);
   options.gate.trust_scans_on_slip = bytes.chance();
+  options.deskew = bytes.chance();
+  options.odometry_noise.model = odometryModelNames()[static_cast<std::size_t>(bytes.upTo(2))];
   options.scan.max_beams = bytes.chance() ? 60 : 400;
   return options;
 }
@@ -198,6 +200,7 @@ class Driver {
     SimulatedLaser laser;
     laser.beams = 90;
     laser.angle_increment = 2.0 * M_PI / laser.beams;
+    laser.time_increment = 0.0005;
     LaserScan scan = simulateScan(world, robot_.pose(), laser);
     scan.stamp = robot_.now;
     return scan;
@@ -205,7 +208,7 @@ class Driver {
 
   void addSpoiltScan() {
     LaserScan scan = this->scan();
-    switch (bytes_.upTo(5)) {
+    switch (bytes_.upTo(6)) {
       case 0:
         scan.stamp = spoiltStamp();
         break;
@@ -222,6 +225,9 @@ class Driver {
         for (float& range : scan.ranges) range = static_cast<float>(bytes_.number(20.0));
         break;
       case 4:
+        scan.time_increment = bytes_.number(0.01);
+        break;
+      case 5:
         scan.ranges.resize(100U * bytes_.any<std::uint8_t>(), scan.ranges.front());
         scan.angle_increment = 6.0 / static_cast<double>(scan.ranges.size() + 1);
         break;
@@ -263,6 +269,9 @@ class Driver {
       if (report.innovation) require(std::isfinite(report.innovation->nis()), "the NIS is finite");
       const bool used = report.outcome == ScanOutcome::kReference || wasUsed(report.outcome);
       require(used == report.reason.empty(), "a scan that is not used has a reason: " + report.reason);
+      const bool is_skewed = report.deskewing == Deskewing::kNotTold || report.deskewing == Deskewing::kRefused;
+      require(is_skewed == !report.deskewing_problem.empty(),
+              "a scan that should be deskewed has a reason if it is not");
     }
     if (const auto latest = pipeline_.latest()) requireSound(*latest);
     require(scans_ == reported_ + pipeline_.waitingScans(), "every scan is in one report or waits");

@@ -71,9 +71,20 @@ LaserScan thinned(const LaserScan& scan, std::size_t max_beams) {
   const std::size_t k = (scan.ranges.size() + max_beams - 1) / max_beams;
   LaserScan thin = scan;
   thin.angle_increment *= static_cast<double>(k);
+  thin.time_increment *= static_cast<double>(k);
   thin.ranges.clear();
   for (std::size_t i = 0; i < scan.ranges.size(); i += k) thin.ranges.push_back(scan.ranges[i]);
   return thin;
+}
+
+/// What was measured t_i after the stamp, to where the robot was at the stamp: p ← C(φ(t_i)) p + t(t_i), and the rays
+/// with it.
+void undo(const ScanMotion& motion, double time_increment, ScannedPoints& points) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const SE2 stamp_from_base = motion.at(points.beam[i] * time_increment);
+    points.point[i] = stamp_from_base * points.point[i];
+    points.ray[i] = stamp_from_base.rotation() * points.ray[i];
+  }
 }
 
 ScannedPoints readings(const LaserScan& scan, const Eigen::Isometry3d& base_from_laser, double range_min,
@@ -101,7 +112,8 @@ Eigen::VectorXd PreparedScan::rangeVariances() const {
 }
 
 std::shared_ptr<const PreparedScan> prepareScan(const LaserScan& scan, const Eigen::Isometry3d& base_from_laser,
-                                                const ScanOptions& options, std::string* rejection) {
+                                                const ScanOptions& options, std::string* rejection,
+                                                const ScanMotion& motion) {
   const auto reject = [rejection](const std::string& reason) {
     if (rejection != nullptr) *rejection = reason;
     return nullptr;
@@ -110,7 +122,7 @@ std::shared_ptr<const PreparedScan> prepareScan(const LaserScan& scan, const Eig
   if (!problem.empty()) return reject(problem);
   const auto max_beams = static_cast<std::size_t>(std::max(1, options.max_beams));
   if (scan.ranges.size() > max_beams) {
-    return prepareScan(thinned(scan, max_beams), base_from_laser, options, rejection);
+    return prepareScan(thinned(scan, max_beams), base_from_laser, options, rejection, motion);
   }
 
   auto prepared = std::make_shared<PreparedScan>();
@@ -119,6 +131,7 @@ std::shared_ptr<const PreparedScan> prepareScan(const LaserScan& scan, const Eig
   const double range_min = std::max(options.range_min, scan.range_min);
   const double range_max = std::min(options.range_max, scan.range_max);
   prepared->points = readings(scan, base_from_laser, range_min, range_max);
+  if (!motion.atRest()) undo(motion, scan.time_increment, prepared->points);
   if (prepared->size() < static_cast<std::size_t>(options.min_points)) {
     std::ostringstream reason;
     reason << prepared->size() << " of " << scan.ranges.size() << " ranges are finite and within [" << range_min << ", "

@@ -78,6 +78,7 @@ ScanOdometry::ScanOdometry(const PipelineOptions& options, const SE2& odom_from_
       start_covariance_(covariance) {
   checkMethod(options.method);
   checkStates(options);
+  modelledIncrement(SE2(), options.odometry_noise);  // throws if there is no such model
   checkPose(odom_from_base, covariance);
 }
 
@@ -92,14 +93,7 @@ OdometryBuffer::Insertion ScanOdometry::addOdometry(const OdometrySample& sample
   followWheels(newest_before);
   if (!filter_) begin(start_, start_covariance_, sample.stamp);
   carryOn();  // first: what the filter takes is forgotten
-  // Without scans the filter follows the wheels at a distance, so that the buffer stays small; from sample to sample,
-  // so that it makes no difference when the samples arrived.
-  const Stamp too_old = odometry_.newest() - toDuration(options_.max_scan_delay);
-  if (too_old > filter_stamp_) {
-    const Stamp last = odometry_.lastUpTo(too_old);
-    if (last > filter_stamp_) propagateTo(last);
-    if (carried_on_stamp_ < filter_stamp_) carryOn();
-  }
+  followAtADistance();
   return insertion;
 }
 
@@ -110,7 +104,8 @@ void ScanOdometry::addScan(LaserScan scan, const Eigen::Isometry3d& base_from_la
     given_up_.push_back(notUsed(scan.stamp, ScanOutcome::kUnusable, reason.str()));
     return;
   }
-  waiting_.add(std::move(scan), base_from_laser);
+  const Sweep sweep = options_.deskew ? sweeps_.check(scan) : Sweep();
+  waiting_.add(std::move(scan), base_from_laser, sweep);
   while (waiting_.size() > static_cast<std::size_t>(options_.max_waiting_scans)) {
     given_up_.push_back(
         notUsed(waiting_.giveUp(), ScanOutcome::kNoOdometry, "too many scans wait for odometry at their stamps"));
@@ -120,11 +115,14 @@ void ScanOdometry::addScan(LaserScan scan, const Eigen::Isometry3d& base_from_la
 std::vector<ScanReport> ScanOdometry::process() {
   std::vector<ScanReport> reports;
   reports.swap(given_up_);
-  while (!waiting_.empty() && imuTells(waiting_.oldest())) {
-    const bool bracketed = filter_ && waiting_.oldest() <= odometry_.newest();
-    if (!bracketed && !bridgeTo(waiting_.oldest())) break;
+  bool held_back = false;
+  while (!waiting_.empty() && imuTells(waiting_.endOfOldest())) {
+    const bool bracketed = filter_ && waiting_.endOfOldest() <= odometry_.newest();
+    if (!bracketed && !bridgeToOldestWaiting()) break;
+    held_back = held_back || waiting_.endOfOldest() > waiting_.oldest();
     reports.push_back(take(waiting_.takeOldest()));
   }
+  if (held_back) followAtADistance();
   return reports;
 }
 
@@ -137,13 +135,16 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   }
   ScanReport report;
   report.stamp = stamp;
+  report.deskewing = waiting.sweep.deskewing;
+  report.deskewing_problem = waiting.sweep.problem;
   const Stamp before = filter_stamp_;
   std::optional<DisplacementPrediction> at_before;  // asked for where wheels do not tell the twist
   if (odometry_.endsBridged()) at_before = filter_->predictedDisplacement();
   propagateTo(stamp);  // (9)-(14)
   useHeading(report);  // (34)
   report.wheels_known = std::exchange(wheels_known_, true);
-  report.scan = prepareScan(waiting.scan, waiting.base_from_laser, options_.scan, &report.reason);
+  report.scan =
+      prepareScan(waiting.scan, waiting.base_from_laser, options_.scan, &report.reason, motionDuring(waiting));
   if (!report.scan) {
     report.outcome = ScanOutcome::kUnusable;
   } else if (references_.empty()) {
@@ -252,6 +253,7 @@ void ScanOdometry::setOptions(const PipelineOptions& options) {
     throw std::invalid_argument("method is \"" + options.method + "\": expected \"" + options_.method +
                                 "\", which only a new estimate can change");
   }
+  modelledIncrement(SE2(), options.odometry_noise);  // throws if there is no such model
   options_ = options;
   matcher_ = ScanMatcher(options.matcher);
   reference_policy_.setOptions(options.reference);
@@ -270,6 +272,29 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
   reference_policy_ = ReferencePolicy(options_.reference);
   carried_on_.reset();
   carryOn();
+}
+
+/// The odometry at hand covers it, the filter is at its beginning.
+ScanMotion ScanOdometry::motionDuring(const WaitingScans::Entry& waiting) const {
+  ScanMotion motion;
+  Standstill standstill = standstill_;
+  for (const OdometryBuffer::Step& step : odometry_.steps(waiting.scan.stamp, waiting.end())) {
+    motion.add(filter_->refined(increment(step, standstill)).before_from_after,
+               seconds(step.to.stamp - step.from.stamp));
+  }
+  return motion;
+}
+
+/// Without scans the filter follows the wheels at a distance, so that the buffer stays small; from sample to sample, so
+/// that it makes no difference when the samples arrived. A scan that waits for the end of its sweep holds it back.
+void ScanOdometry::followAtADistance() {
+  Stamp too_old = odometry_.newest() - toDuration(options_.max_scan_delay);
+  const bool holds_back = !waiting_.empty() && waiting_.endOfOldest() > waiting_.oldest();
+  if (holds_back) too_old = std::min(too_old, waiting_.oldest());
+  if (too_old <= filter_stamp_) return;
+  const Stamp last = odometry_.lastUpTo(too_old);
+  if (last > filter_stamp_) propagateTo(last);
+  if (carried_on_stamp_ < filter_stamp_) carryOn();
 }
 
 void ScanOdometry::propagateTo(Stamp stamp) {
@@ -345,11 +370,13 @@ bool ScanOdometry::wheelsAreSilent() const {
   return waiting_.countAfter(heard + timeout) >= std::min(kConfirmations, most);
 }
 
-bool ScanOdometry::bridgeTo(Stamp stamp) {
+bool ScanOdometry::bridgeToOldestWaiting() {
   const bool scans_tell = options_.method != "dead_reckoning";
   if (!options_.scans_alone || !scans_tell || !wheelsAreSilent()) return false;
-  odometry_.bridge(stamp, guess());
-  if (!filter_) begin(start_, start_covariance_, stamp);
+  for (const Stamp stamp : {waiting_.oldest(), waiting_.endOfOldest()}) {
+    if (odometry_.empty() || stamp > odometry_.newest()) odometry_.bridge(stamp, guess());
+    if (!filter_) begin(start_, start_covariance_, stamp);
+  }
   return true;
 }
 

@@ -11,9 +11,9 @@ bool later(Stamp stamp, const WaitingScans::Entry& entry) { return stamp < entry
 
 }  // namespace
 
-void WaitingScans::add(LaserScan scan, const Eigen::Isometry3d& base_from_laser) {
+void WaitingScans::add(LaserScan scan, const Eigen::Isometry3d& base_from_laser, const Sweep& sweep) {
   const auto place = std::upper_bound(scans_.begin(), scans_.end(), scan.stamp, later);
-  scans_.insert(place, Entry{std::move(scan), base_from_laser, arrivals_++});
+  scans_.insert(place, Entry{std::move(scan), base_from_laser, sweep, arrivals_++});
 }
 
 std::size_t WaitingScans::countAfter(Stamp stamp) const {

@@ -91,6 +91,7 @@ LaserScan toScan(const sensor_msgs::LaserScan& message) {
   scan.stamp = toStamp(message.header.stamp);
   scan.angle_min = static_cast<double>(message.angle_min);
   scan.angle_increment = static_cast<double>(message.angle_increment);
+  scan.time_increment = static_cast<double>(message.time_increment);
   scan.range_min = static_cast<double>(message.range_min);
   scan.range_max = static_cast<double>(message.range_max);
   scan.ranges = message.ranges;
@@ -265,6 +266,7 @@ sckf_odometry::Status toStatus(const ScanReport& report, const std::string& meth
   status.new_reference = report.new_reference;
   status.older_references = static_cast<std::uint8_t>(std::min(report.older_references, 255));
   status.wheels_known = report.wheels_known;
+  status.deskewed = report.deskewing == Deskewing::kDone;
   status.pairs = static_cast<uint32_t>(report.match.pairs.size());
   status.overlap = report.match.overlap;
   status.residual_rms = report.match.residual_rms;

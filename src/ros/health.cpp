@@ -46,6 +46,7 @@ void Health::scanTaken(const ScanReport& report) {
   if (scans_in_pipeline_ > 0) --scans_in_pipeline_;
   const bool is_failed_match = report.outcome == ScanOutcome::kNoMatch;
   scans.ended(toString(report.outcome) + (is_failed_match ? ", " + toString(report.match.failure) : ""));
+  ++deskewing_[report.deskewing];
   last_scan_ = toString(report.outcome) + (report.reason.empty() ? "" : ": " + report.reason);
   slips_now_ = report.outcome == ScanOutcome::kSlip;
   if (slips_now_) ++slips_;
@@ -148,6 +149,9 @@ void Health::addScans(const Conditions& conditions, const ros::Time& now, Status
   status.add("scans: waiting for their mount", conditions.scans_without_mount);
   status.add("scans: held back", conditions.scans_held_back);
   addRecent("scans", scans.recent(now), status);
+  for (const auto& [deskewing, count] : deskewing_) {
+    if (deskewing != Deskewing::kOff) status.add("scans " + toString(deskewing), count);
+  }
   status.add("last scan", last_scan_);
   if (timed_ == 0) return;
   status.addf("time of a scan, mean [ms]", "%.3f", 1e3 * time_ / static_cast<double>(timed_));

@@ -4,6 +4,7 @@
 #include <optional>
 #include <sstream>
 
+#include "sckf_odometry/ros/cloud_message.h"
 #include "sckf_odometry/ros/conversions.h"
 
 namespace sckf {
@@ -32,15 +33,24 @@ InputGate::InputGate(const NodeOptions& options, const std::string& odometry_sou
       odometry_stamps_(options.time_jump),
       scan_stamps_(options.time_jump) {}
 
-InputGate::Scans InputGate::admit(const Scan& message) {
-  const std_msgs::Header& header = message->header;
+InputGate::Scans InputGate::admit(const sensor_msgs::LaserScan::ConstPtr& message) {
+  const std::string problem = isTurnedRound(*message) ? turnedRound(*message) : "";
+  return admit({message->header, message}, "angles turned round", problem);
+}
+
+InputGate::Scans InputGate::admit(const sensor_msgs::PointCloud2::ConstPtr& message) {
+  return admit({message->header, message}, "bad cloud", cloudProblem(*message));
+}
+
+InputGate::Scans InputGate::admit(const Scan& message, const std::string& kind, const std::string& problem) {
+  const std_msgs::Header& header = message.header;
   health_.scans.came(header.stamp, ros::Time::now());
   if (header.stamp.isZero()) {
     refuseScan("no stamp", "header.stamp is 0: the time of the first beam expected");
   } else if (header.frame_id.empty()) {
     refuseScan("no frame", "header.frame_id is empty: the laser's frame expected");
-  } else if (isTurnedRound(*message)) {
-    refuseScan("angles turned round", turnedRound(*message));
+  } else if (!problem.empty()) {
+    refuseScan(kind, problem);
   } else {
     const Stamp stamp = toStamp(header.stamp);
     const Scans admission = scan_stamps_.admit(stamp, message, now(), odometry_stamps_.newest());

@@ -1,5 +1,6 @@
 // The one list of all parameters. A new option needs a line here and its entry in config/sckf_odometry.yaml.
 #include "sckf_odometry/core/fusion_method.h"
+#include "sckf_odometry/core/odometry_model.h"
 #include "sckf_odometry/ros/parameters.h"
 
 namespace sckf {
@@ -40,6 +41,7 @@ List nodeParameters(NodeOptions& node) {
       flag("invert_odom_tf", node.invert_odom_tf),
       flag("use_tf_odometry", node.use_tf_odometry),
       text("tf_odometry_frame", node.tf_odometry_frame),
+      flag("use_cloud_input", node.use_cloud_input),
       number("queue_size", node.queue_size, within(1, 1e6), "messages"),
       number("time_jump", node.time_jump, above(0.0), "s"),
       textOrNothing("state_file", node.state_file),
@@ -52,7 +54,13 @@ List nodeParameters(NodeOptions& node) {
 }
 
 List nodeParametersAtRunTime(NodeOptions& node) {
+  CloudOptions& cloud = node.cloud_input;
   return {
+      number("cloud_height_min", cloud.height_min, within(-100.0, 100.0), "m"),
+      number("cloud_height_max", cloud.height_max, within(-100.0, 100.0), "m"),
+      number("cloud_range_min", cloud.range_min, within(0.0, 1000.0), "m"),
+      number("cloud_range_max", cloud.range_max, aboveUpTo(0.0, 1000.0), "m"),
+      number("cloud_beams", cloud.beams, within(20, 1000000), "beams"),
       number("scan_timeout", node.scan_timeout, within(0.01, 3600.0), "s"),
       number("visualization_rate", node.visualization_rate, within(0.0, 100.0), "1/s"),
   };
@@ -62,6 +70,8 @@ List odometryParameters(PipelineOptions& pipeline) {
   OdometryNoise& noise = pipeline.odometry_noise;
   MotionLimits& motion = pipeline.motion;
   return {
+      text("odometry_model", noise.model, odometryModelNames()),
+      number("odometry_lateral_share", noise.lateral_share, within(0.0, 1.0)),
       number("odometry_translation_per_meter", noise.translation_per_meter, within(0.0, 10.0), "m/sqrt(m)"),
       number("odometry_translation_per_radian", noise.translation_per_radian, within(0.0, 10.0), "m/sqrt(rad)"),
       number("odometry_yaw_per_meter", noise.yaw_per_meter, within(0.0, 10.0), "rad/sqrt(m)"),
@@ -131,8 +141,10 @@ List estimationParameters(PipelineOptions& pipeline) {
   };
 }
 
-List scanParameters(ScanOptions& scan) {
+List scanParameters(PipelineOptions& pipeline) {
+  ScanOptions& scan = pipeline.scan;
   return {
+      flag("deskew", pipeline.deskew),
       number("range_min", scan.range_min, within(0.0, 1000.0), "m"),
       number("range_max", scan.range_max, aboveUpTo(0.0, 1000.0), "m"),
       number("range_noise_min", scan.range_noise_min, aboveUpTo(0.0, 10.0), "m"),
@@ -180,7 +192,7 @@ std::vector<Parameter> parameterList(Options& options) {
   all.insert(all.end(), other.begin(), other.end());
   for (const List& list :
        {nodeParametersAtRunTime(options.node), odometryParameters(pipeline), estimationParameters(pipeline),
-        scanParameters(pipeline.scan), matcherParameters(pipeline.matcher)}) {
+        scanParameters(pipeline), matcherParameters(pipeline.matcher)}) {
     const List live = atRunTime(list);
     all.insert(all.end(), live.begin(), live.end());
   }

@@ -121,6 +121,8 @@ void checkTogether(const Options& options, std::vector<std::string>& problems) {
     if (low >= high) problems.push_back(text.str());
   };
   ordered("range_min", scan.range_min, "range_max", scan.range_max);
+  ordered("cloud_height_min", node.cloud_input.height_min, "cloud_height_max", node.cloud_input.height_max);
+  ordered("cloud_range_min", node.cloud_input.range_min, "cloud_range_max", node.cloud_input.range_max);
   ordered("range_noise_min", scan.range_noise_min, "range_noise_max", scan.range_noise_max);
   if (node.odom_frame == node.base_frame) {
     problems.push_back("odom_frame = \"" + node.odom_frame + "\": another frame than base_frame expected");

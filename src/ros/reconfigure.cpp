@@ -23,6 +23,7 @@ class ConfigSource : public ParameterSource {
     for (const auto& entry : message_.bools) {
       values[entry.name] = {static_cast<bool>(entry.value), entry.value ? "true" : "false"};
     }
+    for (const auto& entry : message_.strs) values[entry.name] = {entry.value, "\"" + entry.value + "\""};
     for (const auto& entry : message_.ints) values[entry.name] = {entry.value, std::to_string(entry.value)};
     for (const auto& entry : message_.doubles) values[entry.name] = {entry.value, std::to_string(entry.value)};
     return values;
@@ -43,6 +44,8 @@ ScKfOdometryConfig toConfig(Options options) {
       ConfigTools::appendParameter(message, parameter.name, **whole);
     } else if (const auto* real = std::get_if<double*>(&parameter.field)) {
       ConfigTools::appendParameter(message, parameter.name, **real);
+    } else if (const auto* text = std::get_if<std::string*>(&parameter.field)) {
+      ConfigTools::appendParameter(message, parameter.name, **text);
     }
   }
   ScKfOdometryConfig config = ScKfOdometryConfig::__getDefault__();

@@ -44,7 +44,7 @@ Options readOptions(const ros::NodeHandle& private_nh) {
 
 ScKfOdometryNode::ScKfOdometryNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     : options_(readOptions(private_nh)),
-      scan_topic_(nh.resolveName("scan")),
+      scan_topic_(nh.resolveName(options_.node.use_cloud_input ? "cloud_in" : "scan")),
       odometry_source_(options_.node.use_tf_odometry ? "TF" : nh.resolveName("odom")),
       pipeline_(std::make_unique<ScanOdometry>(options_.pipeline)),
       tf_(options_.node.base_frame, options_.node.use_tf_odometry ? options_.node.tf_odometry_frame : "",
@@ -88,7 +88,9 @@ void ScKfOdometryNode::subscribe(ros::NodeHandle& nh) {
   if (options_.pipeline.imu.isUsed()) {
     subscribers_.push_back(nh.subscribe("imu", queue, &ScKfOdometryNode::onImu, this, hints));
   }
-  subscribers_.push_back(nh.subscribe("scan", queue, &ScKfOdometryNode::onScan, this, hints));
+  subscribers_.push_back(options_.node.use_cloud_input
+                             ? nh.subscribe("cloud_in", queue, &ScKfOdometryNode::onCloud, this, hints)
+                             : nh.subscribe("scan", queue, &ScKfOdometryNode::onScan, this, hints));
 }
 
 void ScKfOdometryNode::startTimers(ros::NodeHandle& nh) {
@@ -128,14 +130,12 @@ void ScKfOdometryNode::guarded(const Callback& callback) {
   }
 }
 
-void ScKfOdometryNode::onScan(const Scan& message) {
-  guarded([&] {
-    const InputGate::Scans admission = gate_.admit(message);
-    // Without odometry it is the scans that tell the time.
-    if (admission.time_jump < Stamp(0) && pipeline_->onScansAlone()) followTime(admission.time_jump);
-    for (const Scan& scan : admission.passed) scans_without_mount_.push_back(scan);
-    advance();
-  });
+void ScKfOdometryNode::onScan(const sensor_msgs::LaserScan::ConstPtr& message) {
+  guarded([&] { addScans(gate_.admit(message)); });
+}
+
+void ScKfOdometryNode::onCloud(const sensor_msgs::PointCloud2::ConstPtr& message) {
+  guarded([&] { addScans(gate_.admit(message)); });
 }
 
 void ScKfOdometryNode::onOdometry(const nav_msgs::Odometry::ConstPtr& message) {
@@ -175,6 +175,13 @@ void ScKfOdometryNode::setViewRate() {
   if (rate <= 0.0) return view_timer_.stop();
   view_timer_.setPeriod(ros::WallDuration(1.0 / rate));
   view_timer_.start();
+}
+
+void ScKfOdometryNode::addScans(const InputGate::Scans& admission) {
+  // Without odometry it is the scans that tell the time.
+  if (admission.time_jump < Stamp(0) && pipeline_->onScansAlone()) followTime(admission.time_jump);
+  for (const Scan& scan : admission.passed) scans_without_mount_.push_back(scan);
+  advance();
 }
 
 void ScKfOdometryNode::addOdometry(const InputGate::Samples& admission) {
@@ -218,8 +225,9 @@ void ScKfOdometryNode::passScansWithMount() {
   for (const Scan& message : scans_without_mount_) {
     if (paused_) {
       health_.scans.ended("paused");
-    } else if (const auto base_from_laser = tf_.baseFrom(frameName(message->header.frame_id), &mount_problem_)) {
-      pipeline_->addScan(toScan(*message), *base_from_laser);
+    } else if (const auto base_from_sensor = tf_.baseFrom(frameName(message.header.frame_id), &mount_problem_)) {
+      const MountedScan mounted = toMountedScan(message, *base_from_sensor, options_.node.cloud_input);
+      pipeline_->addScan(mounted.scan, mounted.base_from_laser);
       health_.scanPassed();
     } else {
       waiting.push_back(message);
@@ -238,10 +246,17 @@ void ScKfOdometryNode::account(const ScanReport& report) {
     const std::string outcome = toString(report.outcome);
     warnings_.warn("scan " + outcome, "scan on " + scan_topic_ + " not used: " + outcome + ": " + report.reason);
   }
+  warnOfSkew(report);
   debug_view_.show(report);
   if (!report.estimate) return;
   publisher_.publish(*report.estimate);
   publisher_.publishScan(*report.estimate, report.scan.get());
+}
+
+void ScKfOdometryNode::warnOfSkew(const ScanReport& report) {
+  const std::string text = "scan on " + scan_topic_ + " used as it is, not deskewed: " + report.deskewing_problem;
+  if (report.deskewing == Deskewing::kNotTold) warnings_.warnOnce("scan " + toString(report.deskewing), text);
+  if (report.deskewing == Deskewing::kRefused) warnings_.warn("scan " + toString(report.deskewing), text);
 }
 
 void ScKfOdometryNode::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, const std::string& reason) {

@@ -13,8 +13,10 @@
 #include <stdexcept>
 
 #include "sckf_odometry/pipeline/scan_odometry.h"
+#include "sckf_odometry/ros/cloud_message.h"
 #include "sckf_odometry/ros/conversions.h"
 #include "sckf_odometry/ros/parameters.h"
+#include "sckf_odometry/ros/range_message.h"
 #include "sckf_odometry/ros/tf_input.h"
 #include "sckf_odometry/tools/progress_bar.h"
 
@@ -28,7 +30,7 @@ struct Arguments {
   std::string csv;
   std::string params;
   std::string method;
-  std::string scan_topic = "/scan";
+  std::string scan_topic;  // empty: the default of its kind
   std::string odom_topic = "/odom";
   std::string imu_topic = "/imu";
 };
@@ -126,12 +128,16 @@ class Statistics {
  public:
   void add(const ScanReport& report, double time) {
     ++outcomes_[report.outcome];
+    ++deskewing_[report.deskewing];
     times_.push_back(time);
   }
 
   void print(double log_duration, double wall_time) {
     std::printf("%zu scans", times_.size());
     for (const auto& [outcome, count] : outcomes_) std::printf(", %zu %s", count, toString(outcome).c_str());
+    for (const auto& [deskewing, count] : deskewing_) {
+      if (deskewing != Deskewing::kOff) std::printf(", %zu %s", count, toString(deskewing).c_str());
+    }
     std::printf("\n");
     if (times_.empty()) return;
     std::sort(times_.begin(), times_.end());
@@ -146,6 +152,7 @@ class Statistics {
   }
 
   std::map<ScanOutcome, std::size_t> outcomes_;
+  std::map<Deskewing, std::size_t> deskewing_;
   std::vector<double> times_;
 };
 
@@ -159,6 +166,7 @@ class Replay {
             Stamp(std::chrono::seconds(1))),
         trajectory_(arguments.trajectory),
         csv_(arguments.csv) {
+    if (arguments_.scan_topic.empty()) arguments_.scan_topic = takesClouds() ? "/cloud_in" : "/scan";
     if (csv_) writeCsvHeader(csv_);
   }
 
@@ -179,12 +187,12 @@ class Replay {
     }
     progress.finish();
     if (scans_ == 0) {
-      throw std::runtime_error(arguments_.bag + ": no sensor_msgs/LaserScan on " + arguments_.scan_topic +
-                               "; see --scan-topic");
+      throw std::runtime_error(arguments_.bag + ": no sensor_msgs/" + (takesClouds() ? "PointCloud2" : "LaserScan") +
+                               " on " + arguments_.scan_topic + "; see --scan-topic");
     }
     if (!waiting_.empty()) {
       std::fprintf(stderr, "%zu scans not used: no transform %s -> %s: %s\n", waiting_.size(),
-                   options_.node.base_frame.c_str(), frameName(waiting_.back()->header.frame_id).c_str(),
+                   options_.node.base_frame.c_str(), frameName(waiting_.back().header.frame_id).c_str(),
                    mount_problem_.c_str());
     }
     trajectory_.finish();
@@ -194,6 +202,8 @@ class Replay {
   }
 
  private:
+  bool takesClouds() const { return options_.node.use_cloud_input; }
+
   void take(const rosbag::MessageInstance& message) {
     if (const auto transforms = message.instantiate<tf2_msgs::TFMessage>()) {
       tf_.add(*transforms, message.getTopic() == "/tf_static");
@@ -202,12 +212,24 @@ class Replay {
       addOdometry(*odometry);
     } else if (const auto imu = message.instantiate<sensor_msgs::Imu>()) {
       addImu(*imu);
-    } else if (const auto scan = message.instantiate<sensor_msgs::LaserScan>()) {
+    } else if (const auto cloud = message.instantiate<sensor_msgs::PointCloud2>(); cloud && takesClouds()) {
+      addCloud(cloud);
+    } else if (const auto scan = message.instantiate<sensor_msgs::LaserScan>(); scan && !takesClouds()) {
       ++scans_;
-      waiting_.push_back(scan);
+      waiting_.push_back({scan->header, scan});
     }
     passScansWithMount();
     process();
+  }
+
+  void addCloud(const sensor_msgs::PointCloud2::ConstPtr& cloud) {
+    ++scans_;
+    const std::string problem = cloudProblem(*cloud);
+    if (problem.empty()) {
+      waiting_.push_back({cloud->header, cloud});
+    } else {
+      std::fprintf(stderr, "cloud at %.9f not used: %s\n", cloud->header.stamp.toSec(), problem.c_str());
+    }
   }
 
   void addOdometry(const nav_msgs::Odometry& message) {
@@ -236,9 +258,10 @@ class Replay {
 
   void passScansWithMount() {
     while (!waiting_.empty()) {
-      const auto mount = tf_.baseFrom(frameName(waiting_.front()->header.frame_id), &mount_problem_);
+      const auto mount = tf_.baseFrom(frameName(waiting_.front().header.frame_id), &mount_problem_);
       if (!mount) return;
-      pipeline_.addScan(toScan(*waiting_.front()), *mount);
+      const MountedScan mounted = toMountedScan(waiting_.front(), *mount, options_.node.cloud_input);
+      pipeline_.addScan(mounted.scan, mounted.base_from_laser);
       waiting_.pop_front();
     }
   }
@@ -261,7 +284,7 @@ class Replay {
   OutputFile trajectory_;
   OutputFile csv_;
   Statistics statistics_;
-  std::deque<sensor_msgs::LaserScan::ConstPtr> waiting_;  // for their mount
+  std::deque<RangeMessage> waiting_;  // for their mount
   std::string mount_problem_;
   std::size_t scans_ = 0;
 };
@@ -278,7 +301,7 @@ std::optional<Arguments> parse(int argc, char** argv) {
      "write what became of each scan; the innovation is along the directions that the scans see, in m")
     ("params", po::value(&arguments.params), "parameter file, as config/sckf_odometry.yaml")
     ("method", po::value(&arguments.method), "instead of the parameter file's method")
-    ("scan-topic", po::value(&arguments.scan_topic)->default_value(arguments.scan_topic), "")
+    ("scan-topic", po::value(&arguments.scan_topic), "(=/scan, or /cloud_in with the parameter use_cloud_input)")
     ("odom-topic", po::value(&arguments.odom_topic)->default_value(arguments.odom_topic), "")
     ("imu-topic", po::value(&arguments.imu_topic)->default_value(arguments.imu_topic), "with the parameter use_imu");
   // clang-format on

@@ -2,8 +2,12 @@
 
 #include <cmath>
 #include <limits>
+#include <stdexcept>
+#include <string>
 
 #include "matrix_matchers.h"
+#include "monte_carlo_covariance.h"
+#include "random_inputs.h"
 #include "sckf_odometry/core/odometry_model.h"
 
 namespace sckf {
@@ -65,6 +69,174 @@ TEST(ModelledIncrement, HasNoNoiseAtRest) {
 
 TEST(ModelledIncrement, IsTheSameForwardsAndBackwards) {
   EXPECT_TRUE(matricesNear(modelledCovariance(-1.0, 0.0, -0.5), modelledCovariance(1.0, 0.0, 0.5), 0.0));
+}
+
+OdometryNoise handNoise(const std::string& model) {
+  OdometryNoise noise = handNoise();
+  noise.model = model;
+  noise.lateral_share = 0.5;
+  return noise;
+}
+
+Eigen::Matrix3d covarianceOf(const std::string& model, const SE2& motion) {
+  return modelledIncrement(motion, handNoise(model)).covariance;
+}
+
+/// The motion at constant velocity that is n-th of a motion.
+SE2 slice(const SE2& motion, int n) {
+  const auto chord = [](double angle) { return angle == 0.0 ? 1.0 : std::sin(0.5 * angle) / (0.5 * angle); };
+  const Eigen::Vector2d ways =
+      SE2(0.0, 0.0, -0.5 * motion.yaw).rotation() * motion.translation() / (chord(motion.yaw) * n);
+  const double yaw = motion.yaw / n;
+  const Eigen::Vector2d t = chord(yaw) * (SE2(0.0, 0.0, 0.5 * yaw).rotation() * ways);
+  return {t.x(), t.y(), yaw};
+}
+
+/// Q of a motion put together from n equal slices, as a filter does.
+Eigen::Matrix3d sliced(const std::string& model, const SE2& motion, int n) {
+  const OdometryIncrement part = modelledIncrement(slice(motion, n), handNoise(model));
+  SE2 pose;
+  Eigen::Matrix3d P = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < n; ++i) {
+    Eigen::Matrix3d F;
+    Eigen::Matrix3d H;
+    pose = compose(pose, part.before_from_after, &F, &H);
+    P = F * P * F.transpose() + H * part.covariance * H.transpose();
+  }
+  EXPECT_TRUE(matricesNear(pose.vector(), motion.vector(), 1e-9));
+  return P;
+}
+
+TEST(OdometryModel, TheDefaultIsOmnidirectional) {
+  EXPECT_EQ(OdometryNoise().model, "omnidirectional");
+  EXPECT_EQ(odometryModelNames().front(), "omnidirectional");
+  EXPECT_TRUE(matricesNear(covarianceOf("omnidirectional", SE2(3.0, 4.0, 0.5)), diagonal(0.07, 0.07, 0.53), 1e-15));
+}
+
+TEST(OdometryModel, OfANameThatThereIsNotIsRefused) {
+  try {
+    covarianceOf("hovercraft", SE2());
+    ADD_FAILURE() << "taken";
+  } catch (const std::invalid_argument& exception) {
+    EXPECT_STREQ(exception.what(),
+                 "odometry model is \"hovercraft\": expected one of omnidirectional, differential, ackermann");
+  }
+}
+
+TEST(OdometryModel, DifferentialStraightByHand) {
+  // 2 m: ahead 0.1² · 2; to the left a quarter of it and 0.3² 2³/3 of the heading; 0.3² 2²/2 between the two.
+  Eigen::Matrix3d expected;
+  expected << 0.02, 0.0, 0.0, 0.0, 0.245, 0.18, 0.0, 0.18, 0.18;
+  EXPECT_TRUE(matricesNear(covarianceOf("differential", SE2(2.0, 0.0, 0.0)), expected, 1e-15));
+  expected(1, 2) = expected(2, 1) = -0.18;
+  EXPECT_TRUE(matricesNear(covarianceOf("differential", SE2(-2.0, 0.0, 0.0)), expected, 1e-15)) << "backwards";
+}
+
+TEST(OdometryModel, DifferentialTurnOnTheSpotByHand) {
+  // 0.5 rad, 0.2² per rad ahead and a quarter of it to the left, turned on the way: ∫cos² = 0.460368, ∫sin² = 0.039632,
+  // ∫sin cos = 0.114924.
+  Eigen::Matrix3d expected;
+  expected << 0.018811, 0.003448, 0.0, 0.003448, 0.006189, 0.0, 0.0, 0.0, 0.08;
+  EXPECT_TRUE(matricesNear(covarianceOf("differential", SE2(0.0, 0.0, 0.5)), expected, 1e-6));
+}
+
+/// Two wheels 0.5 m apart, each with a noise of 0.02 m/√m of its own: A forward bend of 1 m radius, 1 m long.
+TEST(OdometryModel, DifferentialCorrelatesAheadAndYawAsTwoWheelsDo) {
+  OdometryNoise noise = handNoise("differential");
+  noise.translation_per_meter = 0.02 / std::sqrt(2.0);
+  noise.yaw_per_meter = 0.02 * std::sqrt(2.0) / 0.5;
+  noise.translation_per_radian = noise.yaw_per_radian = noise.lateral_share = 0.0;
+  const auto covariance = [&noise](const SE2& motion) { return modelledIncrement(motion, noise).covariance; };
+  // A short piece of it, so that nothing turns: right 1.25, left 0.75 of the way.
+  const double way = 1e-4;
+  const double right = 0.02 * 0.02 * 1.25 * way;
+  const double left = 0.02 * 0.02 * 0.75 * way;
+  const Eigen::Matrix3d Q = covariance(SE2(way, 0.5 * way * way, way));
+  EXPECT_NEAR(Q(0, 0), 0.25 * (right + left), 1e-12);
+  EXPECT_NEAR(Q(2, 2), (right + left) / 0.25, 1e-12);
+  EXPECT_NEAR(Q(0, 2), 0.5 * (right - left) / 0.5, 1e-11);
+  EXPECT_NEAR(covariance(SE2(-way, 0.5 * way * way, -way))(0, 2), Q(0, 2), 1e-15) << "the same way back";
+  EXPECT_NEAR(covariance(SE2(way, -0.5 * way * way, -way))(0, 2), -Q(0, 2), 1e-15) << "to the right";
+}
+
+TEST(OdometryModel, AckermannStraightByHand) {
+  EXPECT_TRUE(matricesNear(covarianceOf("ackermann", SE2(2.0, 0.0, 0.0)),
+                           covarianceOf("differential", SE2(2.0, 0.0, 0.0)), 1e-15));
+}
+
+TEST(OdometryModel, AckermannErrsInYawWithTheWay) {
+  // 1 m along an arc of 2 m radius: 0.1² · 0.5² of the way, 0.3² of the metre, 0.4² of the half radian.
+  const SE2 arc(2.0 * std::sin(0.5), 2.0 * (1.0 - std::cos(0.5)), 0.5);
+  const Eigen::Matrix3d Q = covarianceOf("ackermann", arc);
+  EXPECT_NEAR(Q(2, 2), 0.0025 + 0.09 + 0.08, 1e-12);
+  // Without noise of its own, yaw errs by half a radian per metre of what the way errs by.
+  OdometryNoise noise = handNoise("ackermann");
+  noise.yaw_per_meter = noise.yaw_per_radian = noise.lateral_share = 0.0;
+  const Eigen::Matrix3d of_way = modelledIncrement(arc, noise).covariance;
+  EXPECT_NEAR(of_way(2, 2), 0.0025, 1e-12);
+  EXPECT_NEAR(of_way(0, 2), 0.1 * 0.1 * 0.5 * std::cos(0.5), 1e-6) << "more way is more of it at its end";
+  EXPECT_NEAR(modelledIncrement(SE2(arc.x, -arc.y, -0.5), noise).covariance(0, 2), -of_way(0, 2), 1e-12);
+  EXPECT_NEAR(modelledIncrement(inverse(arc), noise).covariance(0, 2), of_way(0, 2), 1e-12) << "backwards";
+}
+
+TEST(OdometryModel, AckermannDoesNotTurnWithoutWay) {
+  EXPECT_TRUE(matricesNear(covarianceOf("ackermann", SE2(0.0, 0.0, 0.5)), diagonal(0.0, 0.0, 0.5), 1e-12))
+      << "half a radian is not believed by half a rad²";
+  EXPECT_TRUE(matricesNear(covarianceOf("ackermann", SE2(0.0, 0.0, 0.0)), Eigen::Matrix3d::Zero(), 0.0));
+}
+
+TEST(OdometryModel, QDoesNotDependOnHowAPathIsSliced) {
+  for (const std::string model : {"differential", "ackermann"}) {
+    for (const SE2& motion : {SE2(2.0, 0.0, 0.0), SE2(0.0, 0.0, 0.8), SE2(1.0, 0.3, 0.6), SE2(-0.5, 0.1, -0.4),
+                              SE2(0.4, -0.3, 0.0), SE2(0.1, 0.0, 0.9)}) {
+      const Eigen::Matrix3d Q = covarianceOf(model, motion);
+      for (const int n : {2, 7, 50}) {
+        EXPECT_TRUE(matricesNear(sliced(model, motion, n), Q, 1e-4 * Q.norm())) << model << ", " << n << " slices";
+      }
+    }
+  }
+}
+
+TEST(OdometryModel, QIsThatOfErrorsDrawnAlongThePath) {
+  constexpr int kSlices = 10;
+  RandomInputs random(3);
+  OdometryNoise noise;  // as by default: an error does not bend the path much
+  noise.translation_per_meter = noise.translation_per_radian = 0.02;
+  noise.yaw_per_meter = noise.yaw_per_radian = 0.03;
+  for (const std::string model : {"differential", "ackermann"}) {
+    noise.model = model;
+    const SE2 motion(0.9, 0.35, 0.7);
+    const OdometryIncrement part = modelledIncrement(slice(motion, kSlices), noise);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(part.covariance);
+    const Eigen::Matrix3d root = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+    Eigen::Matrix3d sampled = Eigen::Matrix3d::Zero();
+    for (int draw = 0; draw < kDraws; ++draw) {
+      SE2 pose;
+      for (int i = 0; i < kSlices; ++i) {
+        pose = compose(pose, corrected(part.before_from_after, Eigen::Vector3d(root * random.gaussian(3))));
+      }
+      const Eigen::Vector3d e = error(pose, motion);
+      sampled += e * e.transpose() / kDraws;
+    }
+    EXPECT_TRUE(covariancesAgree(modelledIncrement(motion, noise).covariance, sampled)) << model;
+  }
+}
+
+TEST(OdometryModel, QIsACovarianceWhateverTheMotion) {
+  RandomInputs random(4);
+  for (int i = 0; i < 1000; ++i) {
+    const double size = random.magnitude(1e-12, 1e3);
+    for (const std::string& model : odometryModelNames()) {
+      const SE2 motion(size * random.uniform(-1.0, 1.0), size * random.uniform(-1.0, 1.0), random.uniform(-M_PI, M_PI));
+      for (const SE2& each :
+           {motion, SE2(motion.x, motion.y, 0.0), SE2(0.0, 0.0, motion.yaw), SE2(0.0, motion.y, 0.1)}) {
+        const Eigen::Matrix3d Q = covarianceOf(model, each);
+        ASSERT_TRUE(Q.allFinite()) << model;
+        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(Q, Eigen::EigenvaluesOnly);
+        EXPECT_GE(eigen.eigenvalues().minCoeff(), -1e-12 * Q.norm()) << model << ": " << each.vector().transpose();
+      }
+    }
+  }
 }
 
 TEST(StatedIncrement, HoldsTheTwistOverTheTime) {

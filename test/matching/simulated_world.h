@@ -1,90 +1,18 @@
-// Rooms of straight walls and a laser in them.
+// Rooms of straight walls and a laser in them: those of the experiments.
 #pragma once
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
-#include <cmath>
-#include <limits>
-#include <random>
-#include <vector>
-
-#include "sckf_odometry/core/se2.h"
-#include "sckf_odometry/matching/laser_scan.h"
+#include "sckf_odometry/experiments/simulated_world.h"
 
 namespace sckf::test {
 
-struct Wall {
-  Eigen::Vector2d from;
-  Eigen::Vector2d to;
-};
-using World = std::vector<Wall>;
-
-inline World closedPolygon(const std::vector<Eigen::Vector2d>& corners) {
-  World world;
-  for (std::size_t i = 0; i < corners.size(); ++i) world.push_back({corners[i], corners[(i + 1) % corners.size()]});
-  return world;
-}
-
-/// A room of 8 m × 6 m with a bay and a pillar, its origin inside.
-///
-///        +--------------+
-///        |    []        +---+
-///        |   o              |
-///        |              +---+
-///        +--------------+
-inline World room() {
-  World world = closedPolygon(
-      {{-3.0, -2.5}, {5.0, -2.5}, {5.0, -0.5}, {6.5, -0.5}, {6.5, 1.5}, {5.0, 1.5}, {5.0, 3.5}, {-3.0, 3.5}});
-  const World pillar = closedPolygon({{1.5, 1.8}, {2.3, 1.8}, {2.3, 2.6}, {1.5, 2.6}});
-  world.insert(world.end(), pillar.begin(), pillar.end());
-  return world;
-}
-
-/// Two walls 3 m apart along x, whose ends no laser of 30 m range sees.
-inline World corridor() { return {{{-100.0, -1.5}, {100.0, -1.5}}, {{-100.0, 1.5}, {100.0, 1.5}}}; }
-
-/// Distance along a ray to the nearest wall, infinite if there is none.
-inline double castRay(const World& world, const Eigen::Vector2d& origin, const Eigen::Vector2d& direction) {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (const Wall& wall : world) {
-    Eigen::Matrix2d A;
-    A << direction, wall.from - wall.to;
-    if (std::abs(A.determinant()) < 1e-12) continue;
-    const Eigen::Vector2d solution = A.inverse() * (wall.from - origin);
-    const bool hit = solution.x() > 0.0 && solution.y() >= 0.0 && solution.y() <= 1.0;
-    if (hit) nearest = std::min(nearest, solution.x());
-  }
-  return nearest;
-}
-
-struct SimulatedLaser {
-  int beams = 361;
-  double angle_min = -M_PI;
-  double angle_increment = 2.0 * M_PI / 361.0;
-  double range_max = 30.0;
-  double noise = 0.0;  ///< std of a range [m]
-  Eigen::Isometry3d base_from_laser = Eigen::Isometry3d::Identity();
-};
-
-/// A scan taken with base_link at a pose of the world. random may be null if the laser has no noise.
-inline LaserScan simulateScan(const World& world, const SE2& world_from_base, const SimulatedLaser& laser,
-                              std::mt19937_64* random = nullptr) {
-  std::normal_distribution<double> normal(0.0, 1.0);
-  LaserScan scan;
-  scan.angle_min = laser.angle_min;
-  scan.angle_increment = laser.angle_increment;
-  scan.range_min = 0.05;
-  scan.range_max = laser.range_max;
-  for (int i = 0; i < laser.beams; ++i) {
-    const double bearing = laser.angle_min + i * laser.angle_increment;
-    const Eigen::Vector3d ray =
-        laser.base_from_laser.linear() * Eigen::Vector3d(std::cos(bearing), std::sin(bearing), 0);
-    const Eigen::Vector2d origin = world_from_base * Eigen::Vector2d(laser.base_from_laser.translation().head<2>());
-    const double range = castRay(world, origin, world_from_base.rotation() * ray.head<2>());
-    const double noise = random != nullptr ? laser.noise * normal(*random) : 0.0;
-    scan.ranges.push_back(static_cast<float>(range + noise));
-  }
-  return scan;
-}
+using sckf::castRay;
+using sckf::closedPolygon;
+using sckf::corridor;
+using sckf::room;
+using sckf::SimulatedLaser;
+using sckf::simulateScan;
+using sckf::simulateSweep;
+using sckf::Wall;
+using sckf::World;
 
 }  // namespace sckf::test

@@ -79,17 +79,21 @@ class SimulatedDrive {
   }
 
   /// The same scan however often and in whatever order one asks.
-  LaserScan scan(int ms) const { return scanFrom(path_(1e-3 * ms), ms); }
+  LaserScan scan(int ms) const {
+    return scanAlong([this, ms](double t) { return path_(1e-3 * ms + t); }, ms);
+  }
 
   /// A scan with that stamp from a pose that is so far off the true one.
-  LaserScan scanDisplaced(int ms, const SE2& by) const { return scanFrom(compose(path_(1e-3 * ms), by), ms); }
+  LaserScan scanDisplaced(int ms, const SE2& by) const {
+    return scanAlong([this, ms, by](double t) { return compose(path_(1e-3 * ms + t), by); }, ms);
+  }
 
   SimulatedLaser laser;
 
  private:
-  LaserScan scanFrom(const SE2& world_from_base, int ms) const {
+  LaserScan scanAlong(const std::function<SE2(double)>& world_from_base_at, int ms) const {
     std::mt19937_64 random(static_cast<std::uint64_t>(ms) + 1000000 * seed_);
-    LaserScan scan = simulateScan(world_, world_from_base, laser, &random);
+    LaserScan scan = simulateSweep(world_, world_from_base_at, laser, &random);
     scan.stamp = at(ms);
     return scan;
   }

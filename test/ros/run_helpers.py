@@ -1,5 +1,6 @@
 """What the tests of the running nodelet share: recording what it publishes, feeding it, comparing trajectories."""
 
+import copy
 import math
 import os
 import subprocess
@@ -174,12 +175,24 @@ def accounted(diagnostics, kind, received):
     return came == str(received) and int(diagnostics[kind + ': together']) + waiting == received
 
 
+def changed(message, **fields):
+    """A copy with these fields, named as header__stamp, set."""
+    message = copy.deepcopy(message)
+    for name, value in fields.items():
+        *path, last = name.split('__')
+        part = message
+        for step in path:
+            part = getattr(part, step)
+        setattr(part, last, value)
+    return message
+
+
 class Feeder:
     """Publishes messages as a robot would, in the order given, some times faster than their stamps say."""
 
     def __init__(self, topics):
-        kinds = {'odom': Odometry, 'scan': LaserScan, 'tf_static': TFMessage, 'tf': TFMessage, 'imu': Imu,
-                 'pose_update': PoseWithCovarianceStamped}
+        kinds = {'odom': Odometry, 'scan': LaserScan, 'cloud_in': PointCloud2, 'tf_static': TFMessage, 'tf': TFMessage,
+                 'imu': Imu, 'pose_update': PoseWithCovarianceStamped}
         self._publishers = {
             topic: rospy.Publisher(topic, kinds[topic.split('/')[-1]], queue_size=None, latch=topic == '/tf_static',
                                    tcp_nodelay=True)

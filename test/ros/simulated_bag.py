@@ -12,7 +12,9 @@ import rosbag
 import rospy
 from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
+from sensor_msgs import point_cloud2
 from sensor_msgs.msg import Imu, LaserScan
+from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 START = 1000.0  # [s], time of the first message
@@ -50,6 +52,14 @@ class Mount:
         x, y = np.cos(angles) * math.cos(self.pitch), np.sin(-angles if self.upside_down else angles)
         return self.yaw + np.arctan2(y, x), np.hypot(x, y)
 
+    def to_sensor(self, points):
+        """Points of base_link, n × 3, in the sensor's frame."""
+        (c, s), (cp, sp) = [(math.cos(angle), math.sin(angle)) for angle in (self.yaw, self.pitch)]
+        rotation = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+        if self.upside_down:
+            rotation = rotation @ np.diag([1, -1, -1])
+        return (points - np.array([self.x, self.y, self.z])) @ rotation
+
     def quaternion(self):
         """x, y, z, w of Rz(yaw) Ry(pitch), times Rx(pi) if upside down."""
         c, s = math.cos(self.yaw / 2), math.sin(self.yaw / 2)
@@ -69,6 +79,11 @@ def truth(t):
     return np.array([x, y, math.atan2(ahead[1], ahead[0])])
 
 
+def swinging(t):
+    """The same way with the head turned to and fro, at up to 1.9 rad/s."""
+    return truth(t) + np.array([0.0, 0.0, 0.9 * math.sin(2 * math.pi * t / 3.0)])
+
+
 def compose(a, b):
     c, s = math.cos(a[2]), math.sin(a[2])
     return np.array([a[0] + c * b[0] - s * b[1], a[1] + s * b[0] + c * b[1], a[2] + b[2]])
@@ -82,9 +97,9 @@ def between(a, b):
 
 
 def cast(origin, bearings, segments):
-    """Range along each bearing to the nearest segment, inf where there is none."""
+    """Range along each bearing to the nearest segment, inf where there is none. origin: of all rays, or of each."""
     directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)[:, None, :]
-    a = segments[None, :, 0, :] - origin
+    a = segments[None, :, 0, :] - np.atleast_2d(origin)[:, None, :]
     along = (segments[:, 1] - segments[:, 0])[None]
     cross = lambda p, q: p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0]
     with np.errstate(divide='ignore', invalid='ignore'):
@@ -95,12 +110,12 @@ def cast(origin, bearings, segments):
     return np.where(hit, ranges, np.inf).min(axis=1)
 
 
-def odometry(duration, rng):
+def odometry(duration, rng, path=truth):
     """Poses in the wheels' own frame, which starts at the origin: scale and heading drift, and noise."""
     poses = [np.zeros(3)]
     steps = int(duration * ODOMETRY_RATE)
     for i in range(steps):
-        motion = between(truth(i / ODOMETRY_RATE), truth((i + 1) / ODOMETRY_RATE))
+        motion = between(path(i / ODOMETRY_RATE), path((i + 1) / ODOMETRY_RATE))
         way = math.hypot(motion[0], motion[1])
         noise = rng.normal(size=3) * math.sqrt(way) * np.array([0.01, 0.01, 0.02])
         motion = motion * np.array([1.03, 1.0, 1.0]) + np.array([0.0, 0.0, 0.02 * way]) + noise
@@ -118,20 +133,36 @@ def odometry_message(stamp, pose):
     return message
 
 
-def scan_message(stamp, pose, mount, segments, rng, beams=360, noise=0.01):
+def scan_message(stamp, path, mount, segments, rng, beams=360, noise=0.01, time_increment=0.0):
+    """Taken along a path, a pose of each time t [s] after the stamp: beam i at i * time_increment."""
     message = LaserScan()
     message.header.stamp = stamp
     message.header.frame_id = mount.frame
     message.angle_min = -math.pi
     message.angle_increment = 2 * math.pi / beams
     message.angle_max = message.angle_min + (beams - 1) * message.angle_increment
+    message.time_increment = time_increment
     message.range_min, message.range_max = 0.05, 30.0
     angles = message.angle_min + np.arange(beams) * message.angle_increment
-    laser = compose(pose, np.array([mount.x, mount.y, 0.0]))
+    times = np.arange(beams) * time_increment if time_increment else [0.0]
+    lasers = np.array([compose(path(t), np.array([mount.x, mount.y, 0.0])) for t in times])
     bearings, horizontal = mount.beams(angles)
-    ranges = cast(laser[:2], pose[2] + bearings, segments) / horizontal
+    ranges = cast(lasers[:, :2], lasers[:, 2] + bearings, segments) / horizontal
     message.ranges = (ranges + rng.normal(size=beams) * noise).astype(np.float32).tolist()
     return message
+
+
+def cloud_message(stamp, pose, mount, segments, rng, noise=0.01):
+    """Walls at three heights, the floor around the robot, the robot's own roof, and points that are none."""
+    bearings = np.radians(np.arange(-180.0, 180.0) + rng.uniform(-0.5, 0.5, 360))  # in base_link
+    laser = compose(pose, np.array([mount.x, mount.y, 0.0]))
+    ranges = cast(laser[:2], pose[2] + bearings, segments)
+    rings = [(height, ranges + rng.normal(size=360) * noise) for height in (0.3, 0.6, 0.9)]
+    rings += [(0.0, np.full(360, 1.5)), (1.6, np.full(360, 0.6)), (0.5, np.full(360, np.nan))]
+    points = [np.column_stack([mount.x + r * np.cos(bearings), mount.y + r * np.sin(bearings), np.full(360, height)])
+              for height, r in rings]
+    header = Header(stamp=stamp, frame_id=mount.frame)
+    return point_cloud2.create_cloud_xyz32(header, mount.to_sensor(np.concatenate(points)))
 
 
 def multiply(p, q):
@@ -173,25 +204,31 @@ def mount_message(stamp, *mounts):
     return TFMessage(transforms)
 
 
-def true_trajectory(stamps):
+def true_trajectory(stamps, path=truth):
     """Pose of base_link at these stamps [s] in the frame of its start: what a perfect estimator would say."""
-    return np.array([between(truth(0.0), truth(stamp - START)) for stamp in stamps])
+    return np.array([between(path(0.0), path(stamp - START)) for stamp in stamps])
 
 
-def messages(duration=45.0, mount=None, seed=1, beams=360, imu=None):
-    """(topic, message, stamp) in the order of time; with an ImuUnit its messages at IMU_RATE, too."""
+def messages(duration=45.0, mount=None, seed=1, beams=360, imu=None, path=truth, time_increment=0.0, clouds=False):
+    """(topic, message, stamp) in the order of time; with an ImuUnit its messages at IMU_RATE, too. time_increment: [s] from
+    one beam to the next. clouds: of points, in the place of scans."""
     mount = mount or Mount(x=0.2)
     rng = np.random.default_rng(seed)
     segments = walls()
     mounts = [mount, imu.mount] if imu else [mount]
     out = [('/tf_static', mount_message(rospy.Time.from_sec(START), *mounts), START)]
-    for i, pose in enumerate(odometry(duration, rng)):
+    for i, pose in enumerate(odometry(duration, rng, path)):
         stamp = START + i / ODOMETRY_RATE
         out.append(('/odom', odometry_message(rospy.Time.from_sec(stamp), pose), stamp))
     t = 0.1
-    while t < duration - 0.1:
-        scan = scan_message(rospy.Time.from_sec(START + t), truth(t), mount, segments, rng, beams)
-        out.append(('/scan', scan, START + t))
+    while t < duration - 0.1 - beams * time_increment:
+        stamp = rospy.Time.from_sec(START + t)
+        if clouds:
+            out.append(('/cloud_in', cloud_message(stamp, path(t), mount, segments, rng), START + t))
+        else:
+            scan = scan_message(stamp, lambda later, t=t: path(t + later), mount, segments, rng, beams,
+                                time_increment=time_increment)
+            out.append(('/scan', scan, START + t))
         t += SCAN_PERIOD
     if imu:
         stamps = np.arange(int(duration * IMU_RATE)) / IMU_RATE

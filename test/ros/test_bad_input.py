@@ -14,22 +14,11 @@ import rospy
 import junit_runner
 import run_helpers as helpers
 import simulated_bag
+from run_helpers import changed
 
 NAN, INF = float('nan'), float('inf')
 MANAGER = '/manager'
 MANY_BEAMS = 100000
-
-
-def changed(message, **fields):
-    """A copy with these fields, named as header__stamp, set."""
-    message = copy.deepcopy(message)
-    for name, value in fields.items():
-        *path, last = name.split('__')
-        part = message
-        for step in path:
-            part = getattr(part, step)
-        setattr(part, last, value)
-    return message
 
 
 def bad_scans(good):

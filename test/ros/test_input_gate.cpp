@@ -1,4 +1,5 @@
 #include <gmock/gmock.h>
+#include <sensor_msgs/point_cloud2_iterator.h>
 
 #include "sckf_odometry/ros/conversions.h"
 #include "sckf_odometry/ros/input_gate.h"
@@ -25,6 +26,16 @@ class InputGateTest : public testing::Test {
     return message;
   }
 
+  /// One point.
+  static sensor_msgs::PointCloud2 cloudAt(double time) {
+    sensor_msgs::PointCloud2 message;
+    sensor_msgs::PointCloud2Modifier(message).setPointCloud2FieldsByString(1, "xyz");
+    sensor_msgs::PointCloud2Modifier(message).resize(1);
+    message.header.stamp = ros::Time(time);
+    message.header.frame_id = "lidar";
+    return message;
+  }
+
   static sensor_msgs::LaserScan scanAt(double time) {
     sensor_msgs::LaserScan message;
     message.header.stamp = ros::Time(time);
@@ -37,6 +48,9 @@ class InputGateTest : public testing::Test {
 
   std::size_t admit(const sensor_msgs::LaserScan& message) {
     return gate_.admit(boost::make_shared<sensor_msgs::LaserScan>(message)).passed.size();
+  }
+  std::size_t admit(const sensor_msgs::PointCloud2& message) {
+    return gate_.admit(boost::make_shared<sensor_msgs::PointCloud2>(message)).passed.size();
   }
   std::size_t admit(const nav_msgs::Odometry& message, bool uses_twist_covariance = false) {
     return gate_.admit(message, uses_twist_covariance, tf_).passed.size();
@@ -69,6 +83,28 @@ TEST_F(InputGateTest, ABadScanIsRefusedByWhatIsWrongWithIt) {
   EXPECT_EQ(health_.scans.received(), 3u);
   EXPECT_THAT(health_.scans.ends(), ElementsAre(Pair("refused, angles turned round", 1u), Pair("refused, no frame", 1u),
                                                 Pair("refused, no stamp", 1u)));
+}
+
+TEST_F(InputGateTest, ABadCloudIsRefusedByWhatIsWrongWithIt) {
+  EXPECT_EQ(admit(cloudAt(1000.0)), 1u);
+  EXPECT_EQ(admit(cloudAt(0.0)), 0u);
+  sensor_msgs::PointCloud2 cloud = cloudAt(1000.1);
+  cloud.header.frame_id = "";
+  EXPECT_EQ(admit(cloud), 0u);
+  cloud = cloudAt(1000.1);
+  cloud.fields.pop_back();
+  EXPECT_EQ(admit(cloud), 0u);
+  EXPECT_EQ(health_.scans.received(), 4u);
+  EXPECT_THAT(health_.scans.ends(), ElementsAre(Pair("refused, bad cloud", 1u), Pair("refused, no frame", 1u),
+                                                Pair("refused, no stamp", 1u)));
+}
+
+TEST_F(InputGateTest, CloudsAreInTheRowOfStampsOfScans) {
+  EXPECT_EQ(admit(cloudAt(1000.0)), 1u);
+  EXPECT_EQ(admit(cloudAt(500.0)), 0u);
+  EXPECT_EQ(gate_.scansHeldBack(), 1u);
+  EXPECT_EQ(admit(cloudAt(1000.1)), 1u);
+  EXPECT_THAT(health_.scans.ends(), ElementsAre(Pair("refused, wrong stamp", 1u)));
 }
 
 TEST_F(InputGateTest, BadOdometryIsRefusedByWhatIsWrongWithIt) {
@@ -112,7 +148,7 @@ TEST_F(InputGateTest, ScansAheadOfTheClockPassIfOdometryIsThereToo) {
   ros::Time::setNow(ros::Time(1005.0));
   EXPECT_EQ(admit(odometryAt(1005.0)), 1u);
   ros::Time::setNow(ros::Time(1000.0));
-  EXPECT_EQ(admit(scanAt(1005.1)), 1u);
+  EXPECT_EQ(admit(scanAt(1005.1)), 2u) << "and the one that was held back goes on from it";
 }
 
 TEST_F(InputGateTest, WhereOdometryTellsThatTimeWentBackScansFollowAtOnce) {

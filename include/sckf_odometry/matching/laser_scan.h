@@ -19,11 +19,12 @@ inline Stamp toDuration(double seconds) {
 
 /// Beam i looks along angle_min + i · angle_increment in the plane of the laser, counter-clockwise about its z axis.
 /// A range that is not finite or not within [range_min, range_max) is "no reading" (REP-117; the largest range itself
-/// is what many drivers say where they have seen nothing).
+/// is what many drivers say where they have seen nothing). Beam i was measured at stamp + i · time_increment.
 struct LaserScan {
   Stamp stamp{0};
   double angle_min = 0.0;        ///< [rad], within two turns
   double angle_increment = 0.0;  ///< [rad], may be negative, not zero; all beams within a turn
+  double time_increment = 0.0;   ///< [s], as the driver tells it: zero, and anything else, where it does not
   double range_min = 0.0;        ///< [m]
   double range_max = 0.0;        ///< [m]
   std::vector<float> ranges;     ///< [m]

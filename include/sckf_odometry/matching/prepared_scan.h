@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "sckf_odometry/matching/laser_scan.h"
+#include "sckf_odometry/matching/scan_motion.h"
 #include "sckf_odometry/matching/surface.h"
 
 namespace sckf {
@@ -24,7 +25,7 @@ struct ScanOptions {
   SurfaceOptions surface;
 };
 
-/// Everything is in base_link, projected to its x-y plane. Point i comes from beam points.beam[i].
+/// Everything is in base_link at the stamp, projected to its x-y plane. Point i comes from beam points.beam[i].
 struct PreparedScan {
   Stamp stamp{0};
   std::size_t beams = 0;             ///< M: number of ranges used of the scan, read or not
@@ -38,8 +39,10 @@ struct PreparedScan {
 };
 
 /// base_from_laser may point anywhere: ahead, rotated, upside down. If the scan cannot be used: null, and in rejection,
-/// where given, what was found and what is expected, in words for the user.
+/// where given, what was found and what is expected, in words for the user. motion: that of base_link while the beams
+/// were measured, which is undone, with its own error left aside; at rest, they are taken for measured at once.
 std::shared_ptr<const PreparedScan> prepareScan(const LaserScan& scan, const Eigen::Isometry3d& base_from_laser,
-                                                const ScanOptions& options, std::string* rejection = nullptr);
+                                                const ScanOptions& options, std::string* rejection = nullptr,
+                                                const ScanMotion& motion = {});
 
 }  // namespace sckf

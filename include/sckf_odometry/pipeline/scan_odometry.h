@@ -40,6 +40,7 @@ struct PipelineOptions {
   StandstillOptions standstill;
   bool prefer_twist_covariance = false;  ///< use the twist covariance of the odometry message where it is sensible
   ScanOptions scan;
+  bool deskew = false;  ///< undo the motion while a scan is taken; it waits for odometry at its last beam then
   MatcherOptions matcher;
   ReferenceOptions reference;
   GateOptions gate;
@@ -54,8 +55,8 @@ struct PipelineOptions {
 class ScanOdometry {
  public:
   /// The estimate starts at a pose, with a covariance: symmetric, positive semi-definite. Throws std::invalid_argument
-  /// with name, value and what is expected if there is no method of that name, if it lacks what the options ask for, or
-  /// if pose or covariance are none.
+  /// with name, value and what is expected if there is no method, or no odometry model, of that name, if the method
+  /// lacks what the options ask for, or if pose or covariance are none.
   explicit ScanOdometry(const PipelineOptions& options, const SE2& odom_from_base = SE2(),
                         const Eigen::Matrix3d& covariance = Eigen::Matrix3d::Zero());
 
@@ -68,9 +69,10 @@ class ScanOdometry {
   /// they do not cover wholly is not measured by them.
   ImuBuffer::Insertion addImu(const ImuSample& sample) { return imu_.insert(sample); }
 
-  /// The scan waits until odometry brackets its stamp, or until the wheels are silent and scans may carry on alone;
-  /// for an IMU that is not silent it waits, too.
-  /// base_from_laser: the mount at the time of the scan.
+  /// The scan waits until odometry brackets its stamp, or until the wheels are silent and scans may carry on alone; for
+  /// an IMU that is not silent it waits, too. With options.deskew it waits for the end of its sweep, unless the scan's
+  /// time_increment cannot be: then it is used as it is. Scans come from one laser. base_from_laser: the mount at the
+  /// time of the scan.
   void addScan(LaserScan scan, const Eigen::Isometry3d& base_from_laser);
 
   /// Takes the scans whose time has come, oldest first, and says what became of each.
@@ -84,7 +86,8 @@ class ScanOdometry {
   /// odometry: where the estimate starts. Throws as the constructor does.
   void setPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp);
 
-  /// From the next scan on; the estimate and its reference stay. Throws std::invalid_argument if the method differs.
+  /// From the next scan on; the estimate and its reference stay. Throws std::invalid_argument if the method differs, or
+  /// there is no odometry model of that name.
   void setOptions(const PipelineOptions& options);
 
   /// The wheels are silent: the scans carry on alone, or wait, as options.scans_alone says.
@@ -105,14 +108,16 @@ class ScanOdometry {
   void compareWithOlderReferences(ScanReport& report);
   double gate(const Displacement& displacement) const;  ///< a larger innovation, normalised and squared, contradicts
   bool looksLikeSlip(const Match& match) const;
+  ScanMotion motionDuring(const WaitingScans::Entry& waiting) const;
   void propagateTo(Stamp stamp);
   void useHeading(ScanReport& report);
   void carryOn();
   bool imuTells(Stamp stamp) const;
   Stamp settled() const;
+  void followAtADistance();
 
   bool wheelsAreSilent() const;
-  bool bridgeTo(Stamp stamp);
+  bool bridgeToOldestWaiting();
   void followWheels(Stamp since);
   void followScans(Stamp since, const DisplacementPrediction& at_since, const ScanReport& report);
   MotionGuess guess() const;
@@ -127,6 +132,7 @@ class ScanOdometry {
   OdometryBuffer odometry_;
   ImuBuffer imu_;
   TwistWindow twist_;
+  SweepCheck sweeps_;
   WaitingScans waiting_;
   std::vector<ScanReport> given_up_;
   std::optional<Stamp> wheels_heard_;  // the newest stamp of odometry, used or not

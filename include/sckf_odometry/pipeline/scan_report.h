@@ -6,6 +6,7 @@
 #include <string>
 
 #include "sckf_odometry/matching/scan_matcher.h"
+#include "sckf_odometry/pipeline/sweep.h"
 #include "sckf_odometry/pipeline/twist_window.h"
 
 namespace sckf {
@@ -60,6 +61,8 @@ struct ScanReport {
   double gyro_time = 0.0;                    ///< [s] since the estimate before, that the gyro has measured
   HeadingUse heading = HeadingUse::kNone;    ///< of the IMU, at the scan's stamp
   bool stands = false;                       ///< the wheels have told of no motion for some time
+  Deskewing deskewing = Deskewing::kOff;     ///< what became of the motion during the scan
+  std::string deskewing_problem;             ///< in words, where it could not be undone
   double match_time = 0.0;                   ///< [s] spent on the comparison with the reference …
   double total_time = 0.0;                   ///< [s] … and on the scan on the whole
   std::shared_ptr<const PreparedScan> scan;  ///< its points in base_link; null if it was not used

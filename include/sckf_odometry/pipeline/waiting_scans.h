@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <deque>
 
-#include "sckf_odometry/matching/laser_scan.h"
+#include "sckf_odometry/pipeline/sweep.h"
 
 namespace sckf {
 
@@ -14,15 +14,19 @@ class WaitingScans {
   struct Entry {
     LaserScan scan;
     Eigen::Isometry3d base_from_laser;
+    Sweep sweep;
     std::size_t arrival = 0;
+
+    Stamp end() const { return scan.stamp + sweep.duration; }  ///< until when odometry is asked for
   };
 
-  void add(LaserScan scan, const Eigen::Isometry3d& base_from_laser);
+  void add(LaserScan scan, const Eigen::Isometry3d& base_from_laser, const Sweep& sweep = {});
 
   bool empty() const { return scans_.empty(); }
   std::size_t size() const { return scans_.size(); }
   Stamp oldest() const { return scans_.front().scan.stamp; }
   Stamp newest() const { return scans_.back().scan.stamp; }
+  Stamp endOfOldest() const { return scans_.front().end(); }
   std::size_t countAfter(Stamp stamp) const;
 
   Entry takeOldest();

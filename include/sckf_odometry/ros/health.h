@@ -3,6 +3,7 @@
 
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -69,7 +70,8 @@ class Health {
   std::size_t jumps_back_ = 0;
   std::size_t jumps_ahead_ = 0;
 
-  std::string last_scan_;  // what became of it
+  std::map<Deskewing, std::size_t> deskewing_;  // of the scans
+  std::string last_scan_;                       // what became of it
   bool slips_now_ = false;
   Eigen::Index last_dimension_ = 0;
   double last_nis_ = 0.0;

@@ -2,12 +2,12 @@
 #pragma once
 
 #include <nav_msgs/Odometry.h>
-#include <sensor_msgs/LaserScan.h>
 
 #include <string>
 
 #include "sckf_odometry/ros/health.h"
 #include "sckf_odometry/ros/parameters.h"
+#include "sckf_odometry/ros/range_message.h"
 #include "sckf_odometry/ros/stamp_guard.h"
 #include "sckf_odometry/ros/tf_input.h"
 #include "sckf_odometry/ros/warnings.h"
@@ -16,7 +16,7 @@ namespace sckf {
 
 class InputGate {
  public:
-  using Scan = sensor_msgs::LaserScan::ConstPtr;
+  using Scan = RangeMessage;
   using Scans = StampGuard<Scan>::Admission;
   using Samples = StampGuard<OdometrySample>::Admission;
 
@@ -25,7 +25,8 @@ class InputGate {
             Health& health, Warnings& warnings);
 
   /// What may be used now that the message has come.
-  Scans admit(const Scan& message);
+  Scans admit(const sensor_msgs::LaserScan::ConstPtr& message);
+  Scans admit(const sensor_msgs::PointCloud2::ConstPtr& message);
 
   /// The same of odometry from a topic; tf relates its frame to base_frame. What its twist covariance is worth is
   /// looked at where it would be used.
@@ -46,6 +47,7 @@ class InputGate {
   std::size_t scansHeldBack() const { return scan_stamps_.heldBack(); }
 
  private:
+  Scans admit(const Scan& message, const std::string& kind, const std::string& problem);
   Samples admitByStamp(const OdometrySample& sample);
   void warnOfHeldBack(const std::string& what, Stamp stamp);
 

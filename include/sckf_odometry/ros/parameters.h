@@ -7,6 +7,7 @@
 #include <variant>
 #include <vector>
 
+#include "sckf_odometry/matching/point_cloud.h"
 #include "sckf_odometry/pipeline/scan_odometry.h"
 #include "sckf_odometry/ros/parameter_source.h"
 
@@ -20,6 +21,8 @@ struct NodeOptions {
   bool invert_odom_tf = false;   ///< publish base_frame → odom_frame: where base_frame has another parent already
   bool use_tf_odometry = false;  ///< read wheel odometry from TF instead of the topic odom
   std::string tf_odometry_frame = "odom";  ///< frame of the wheel odometry on TF
+  bool use_cloud_input = false;            ///< take clouds of points instead of scans
+  CloudOptions cloud_input;                ///< … and these of their points
   std::size_t queue_size = 2000;           ///< messages per subscription that may wait
   double time_jump = 1.0;                  ///< [s] odometry that goes back by more starts a new estimate
   double scan_timeout = 2.0;               ///< [s] no scan for longer is worth a warning

@@ -9,6 +9,7 @@
 #include <ros/wall_timer.h>
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/LaserScan.h>
+#include <sensor_msgs/PointCloud2.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include <deque>
@@ -32,9 +33,9 @@
 
 namespace sckf {
 
-/// Subscribes to scan, to odom (nav_msgs/Odometry) or TF and, if asked for, to imu, publishes what EstimatePublisher
-/// and DebugView say, status and diagnostics, and serves what Services and Reconfigure say. Its callbacks may come from
-/// any number of threads.
+/// Subscribes to scan or cloud_in, to odom (nav_msgs/Odometry) or TF and, if asked for, to imu, publishes what
+/// EstimatePublisher and DebugView say, status and diagnostics, and serves what Services and Reconfigure say. Its
+/// callbacks may come from any number of threads.
 class ScKfOdometryNode {
  public:
   /// Throws std::invalid_argument if a parameter is bad: parameter, value, what is allowed.
@@ -50,7 +51,8 @@ class ScKfOdometryNode {
   void startTimers(ros::NodeHandle& nh);
   Services::Actions serviceActions();
 
-  void onScan(const Scan& message);
+  void onScan(const sensor_msgs::LaserScan::ConstPtr& message);
+  void onCloud(const sensor_msgs::PointCloud2::ConstPtr& message);
   void onImu(const sensor_msgs::Imu::ConstPtr& message);
   void onOdometry(const nav_msgs::Odometry::ConstPtr& message);
   void onTransforms(const ros::MessageEvent<const tf2_msgs::TFMessage>& event, bool is_static);
@@ -62,6 +64,7 @@ class ScKfOdometryNode {
   template <typename Callback>
   void guarded(const Callback& callback);
 
+  void addScans(const InputGate::Scans& admission);
   void addOdometry(const InputGate::Samples& admission);
   void addOdometry(const OdometrySample& sample);
 
@@ -69,6 +72,7 @@ class ScKfOdometryNode {
   void advance();
   void passScansWithMount();
   void account(const ScanReport& report);
+  void warnOfSkew(const ScanReport& report);
 
   /// A new estimate begins at a pose; what waits is dropped, for a reason in words.
   void begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, const std::string& reason);

@@ -18,6 +18,11 @@ class Warnings {
     if (isDue(kind)) ROS_WARN_STREAM_NAMED("sckf_odometry", text);
   }
 
+  /// For what stays as it is.
+  void warnOnce(const std::string& kind, const std::string& text) {
+    if (last_.count(kind) == 0) warn(kind, text);
+  }
+
   void error(const std::string& kind, const std::string& text) {
     if (isDue(kind)) ROS_ERROR_STREAM_NAMED("sckf_odometry", text);
   }
