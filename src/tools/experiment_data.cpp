@@ -7,9 +7,12 @@
 #include <iostream>
 #include <map>
 
+#include "sckf_odometry/experiments/cloud_input.h"
 #include "sckf_odometry/experiments/complexity.h"
 #include "sckf_odometry/experiments/csv_file.h"
+#include "sckf_odometry/experiments/deskewing.h"
 #include "sckf_odometry/experiments/line_matching.h"
+#include "sckf_odometry/experiments/odometry_models.h"
 #include "sckf_odometry/experiments/one_dimension.h"
 #include "sckf_odometry/experiments/visual_odometry.h"
 #include "sckf_odometry/tools/progress_bar.h"
@@ -27,6 +30,9 @@ struct Arguments {
   OneDimensionOptions one_dimension;
   LineMatchingOptions line_matching;
   VisualOdometryOptions visual_odometry;
+  DeskewingOptions deskewing;
+  CloudInputOptions cloud_input;
+  OdometryModelsOptions odometry_models;
 
   std::string file(const std::string& table) const { return output + "/" + table + ".csv"; }
 };
@@ -144,11 +150,45 @@ void complexity(const Arguments& arguments) {
   for (const UpdateTimes& t : times) table.row({static_cast<double>(t.ranges), t.sckf, t.sckf_nc, t.dense});
 }
 
+void deskewing(const Arguments& arguments) {
+  const std::vector<double> yaw_rates{0.0, 0.5, 1.0, 1.5, 2.0};
+  ProgressBar progress(yaw_rates.size());
+  const auto points = simulateDeskewing(arguments.deskewing, yaw_rates, [&progress] { progress.advance(); });
+  progress.finish();
+  CsvFile table(arguments.file("deskewing"), "yaw_rate,sweep,with_position,with_yaw,without_position,without_yaw");
+  for (const DeskewingPoint& p : points) {
+    table.row({p.yaw_rate, arguments.deskewing.sweep, p.with.position, p.with.yaw, p.without.position, p.without.yaw});
+  }
+}
+
+void cloudInput(const Arguments& arguments) {
+  const std::vector<int> beams{90, 180, 360, 720, 1440};
+  ProgressBar progress(beams.size() + 2);
+  const auto rows = simulateCloudInput(arguments.cloud_input, beams, [&progress] { progress.advance(); });
+  progress.finish();
+  CsvFile table(arguments.file("cloud_input"), "input,beams,position,yaw,scans,used");
+  for (const CloudInputRow& row : rows) {
+    table.row(row.input, {static_cast<double>(row.beams), row.errors.position, row.errors.yaw,
+                          static_cast<double>(row.errors.scans), static_cast<double>(row.errors.used)});
+  }
+}
+
+void odometryModels(const Arguments& arguments) {
+  ProgressBar progress(odometryModelNames().size() * odometryModelNames().size());
+  const auto rows = simulateOdometryModels(arguments.odometry_models, [&progress] { progress.advance(); });
+  progress.finish();
+  CsvFile table(arguments.file("odometry_models"), "robot,model,nees,largest_std,smallest_std,runs");
+  for (const OdometryModelsRow& row : rows) {
+    table.row(row.robot + "," + row.model,
+              {row.nees, row.largest_std, row.smallest_std, static_cast<double>(arguments.odometry_models.runs)});
+  }
+}
+
 const std::map<std::string, std::function<void(const Arguments&)>>& experiments() {
-  static const std::map<std::string, std::function<void(const Arguments&)>> all{{"one_dimension", oneDimension},
-                                                                                {"line_matching", lineMatching},
-                                                                                {"visual_odometry", visualOdometry},
-                                                                                {"complexity", complexity}};
+  static const std::map<std::string, std::function<void(const Arguments&)>> all{
+      {"one_dimension", oneDimension},    {"line_matching", lineMatching}, {"visual_odometry", visualOdometry},
+      {"complexity", complexity},         {"deskewing", deskewing},        {"cloud_input", cloudInput},
+      {"odometry_models", odometryModels}};
   return all;
 }
 
@@ -159,7 +199,7 @@ boost::program_options::options_description optionsFor(Arguments& a) {
   // clang-format off
   shown.add_options()("help,h", "show this help")
     ("output", value(&a.output), "folder for the tables")
-    ("runs", value(&a.runs), "of the Monte Carlo simulation; 0: 400, 200 and 40 of the three below")
+    ("runs", value(&a.runs), "of the Monte Carlo simulation; 0: 400, 200 and 40 of the first three below, 400 of odometry_models")
     ("seed", value(&a.seed), "of the random numbers");
   po::options_description one("one_dimension");
   one.add_options()("density", value(&a.one_dimension.density), "features per metre")
@@ -175,8 +215,13 @@ boost::program_options::options_description optionsFor(Arguments& a) {
   stereo.add_options()("pixel-std", value(&a.visual_odometry.pixel_std), "std of a pixel coordinate")
     ("features", value(&a.visual_odometry.features), "per cubic metre")
     ("far", value(&a.visual_odometry.camera.far), "depth of the farthest features [m]");
+  po::options_description sweeps("deskewing");
+  sweeps.add_options()("sweep", value(&a.deskewing.sweep), "from the first beam of a scan to the last [s]");
+  po::options_description clouds("cloud_input");
+  clouds.add_options()("rings", value(&a.cloud_input.rings), "of the lidar, 2 and more")
+    ("pitch", value(&a.cloud_input.pitch), "of the lidar, forward [rad]");
   // clang-format on
-  return shown.add(one).add(line).add(stereo);
+  return shown.add(one).add(line).add(stereo).add(sweeps).add(clouds);
 }
 
 /// False if the help was asked for, and shown.
@@ -200,8 +245,11 @@ bool parse(int argc, char** argv, Arguments& arguments) {
   if (arguments.runs < 0) throw po::error("--runs must not be negative");
   if (arguments.runs > 0) {
     arguments.one_dimension.runs = arguments.line_matching.runs = arguments.visual_odometry.runs = arguments.runs;
+    arguments.odometry_models.runs = arguments.runs;
   }
+  if (arguments.cloud_input.rings < 2) throw po::error("--rings must be 2 at least");
   arguments.one_dimension.seed = arguments.line_matching.seed = arguments.visual_odometry.seed = arguments.seed;
+  arguments.deskewing.seed = arguments.cloud_input.seed = arguments.odometry_models.seed = arguments.seed;
   return true;
 }
 

@@ -27,7 +27,8 @@ from trajectory import Trajectory  # noqa: E402
 
 RUNS = 20
 FIGURES = ("four_methods", "four_methods_covariance", "line_matching", "line_matching_nees", "line_matching_ratios",
-           "displacement_only", "displacement_only_covariance", "one_dimension", "visual_odometry", "complexity")
+           "displacement_only", "displacement_only_covariance", "one_dimension", "visual_odometry", "complexity",
+           "extensions_deskewing", "extensions_cloud_input", "extensions_odometry_models")
 
 
 def experiment(arguments: List[str], **options: object) -> subprocess.CompletedProcess:
@@ -117,6 +118,30 @@ class AllExperiments(unittest.TestCase):
         self.assertTrue(0.5 < n["slope_sckf"] < 1.5, n)
         self.assertLess(abs(n["slope_sckf_nc"]), 0.4, n)
         self.assertTrue(1.5 < n["slope_dense"] < 2.7, n)
+
+    def test_deskewing_takes_away_what_the_turning_adds(self) -> None:
+        n = self.numbers("extensions")
+        self.assertGreater(n["deskewing_without_yaw"], 3.0 * n["deskewing_with_yaw"])
+        self.assertGreater(n["deskewing_without_position"], 1.5 * n["deskewing_with_position"])
+        self.assertLess(n["deskewing_with_yaw"], 2.0 * n["deskewing_with_yaw_slow"], "as if it had not turned")
+
+    def test_clouds_are_as_good_as_a_laser_within_the_band_of_heights(self) -> None:
+        n = self.numbers("extensions")
+        self.assertLess(n["cloud_input_cloud_720_position"], 2.0 * n["cloud_input_laser_position"])
+        self.assertGreater(n["cloud_input_everything_position"], 5.0 * n["cloud_input_cloud_720_position"])
+
+    def test_each_odometry_model_fits_the_robot_of_its_kind(self) -> None:
+        n = self.numbers("extensions")
+        nees = {(robot, model): n[f"odometry_models_{robot}_by_{model}"]
+                for robot in ("omnidirectional", "differential", "ackermann")
+                for model in ("omnidirectional", "differential", "ackermann")}
+        for kind in ("omnidirectional", "differential", "ackermann"):
+            self.assertTrue(1.5 < nees[kind, kind] < 4.5, f"{RUNS} runs of a {kind} robot: {nees}")
+        self.assertGreater(nees["omnidirectional", "differential"], 1.3 * nees["omnidirectional", "omnidirectional"],
+                           "its wheels slip to the side")
+        self.assertGreater(nees["ackermann", "differential"], 2.0 * nees["ackermann", "ackermann"],
+                           "an error of its way is one of its yaw")
+        self.assertLess(nees["differential", "ackermann"], 0.1, "it turns on the spot, and is not believed")
 
 
 class CommandLine(unittest.TestCase):
