@@ -16,7 +16,10 @@ constexpr std::size_t kMostSamples = 20000;
 
 bool earlier(const ImuSample& sample, Stamp stamp) { return sample.stamp < stamp; }
 
-bool isFinite(const std::optional<double>& value) { return !value || std::isfinite(*value); }
+/// Faster than any gyro measures [rad/s], and more than any yaw is [rad].
+constexpr double kLargest = 1e3;
+
+bool isSensible(const std::optional<double>& value) { return !value || std::abs(*value) <= kLargest; }
 
 double share(const ImuSample& before, const ImuSample& after, Stamp stamp) {
   return seconds(stamp - before.stamp) / seconds(after.stamp - before.stamp);
@@ -29,7 +32,7 @@ double rateAt(const ImuSample& before, const ImuSample& after, Stamp stamp) {
 }  // namespace
 
 ImuBuffer::Insertion ImuBuffer::insert(const ImuSample& sample) {
-  if (!isFinite(sample.yaw_rate) || !isFinite(sample.yaw) || !isTime(sample.stamp)) return Insertion::kNotFinite;
+  if (!isSensible(sample.yaw_rate) || !isSensible(sample.yaw) || !isTime(sample.stamp)) return Insertion::kNotFinite;
   if (discarded_ && sample.stamp < *discarded_) return Insertion::kTooOld;
   const auto after = std::lower_bound(samples_.begin(), samples_.end(), sample.stamp, earlier);
   if (after != samples_.end() && after->stamp == sample.stamp) return Insertion::kDuplicate;

@@ -14,6 +14,8 @@ std::string toString(PoseOutcome outcome) {
       return "too late";
     case PoseOutcome::kNoOdometry:
       return "no odometry";
+    case PoseOutcome::kNoPose:
+      return "no pose";
   }
   return "unknown";
 }

@@ -1,13 +1,13 @@
 #include "sckf_odometry/pipeline/scan_odometry.h"
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
 
 #include "sckf_odometry/core/covariance.h"
+#include "sckf_odometry/pipeline/chi_squared.h"
 
 namespace sckf {
 
@@ -36,6 +36,7 @@ void checkStates(const PipelineOptions& options) {
   if (options.calibration.on) refuse("calibrate_odometry is true", "false");
   if (options.imu.gyro) refuse("use_imu is true", "false");
   if (options.imu.orientation) refuse("use_imu_orientation is true", "false");
+  if (options.pose_updates.on) refuse("use_pose_updates is true", "false");
   if (options.standstill.time > 0.0) refuse("standstill_time is " + std::to_string(options.standstill.time), "0");
 }
 
@@ -51,11 +52,6 @@ void checkPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance) {
             << "]: expected a symmetric, positive semi-definite matrix of finite values up to " << kLargest;
   }
   if (!problem.str().empty()) throw std::invalid_argument(problem.str());
-}
-
-/// The value that a χ² variable of so many degrees of freedom exceeds with probability 1 − p.
-double chiSquared(Eigen::Index degrees_of_freedom, double p) {
-  return boost::math::quantile(boost::math::chi_squared(static_cast<double>(degrees_of_freedom)), p);
 }
 
 std::string describe(const Innovation& innovation, double bound) {
@@ -120,9 +116,11 @@ std::vector<ScanReport> ScanOdometry::process() {
     const bool bracketed = filter_ && waiting_.endOfOldest() <= odometry_.newest();
     if (!bracketed && !bridgeToOldestWaiting()) break;
     held_back = held_back || waiting_.endOfOldest() > waiting_.oldest();
+    takePoses(waiting_.oldest());
     reports.push_back(take(waiting_.takeOldest()));
   }
   if (held_back) followAtADistance();
+  if (filter_) takePoses(filter_stamp_);  // which come late
   return reports;
 }
 
@@ -159,10 +157,12 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
     references_.add(report.scan, options_.reference.kept, *filter_);
   }
   report.estimate = estimate();
+  report.in_map = inMap();
   report.calibration = filter_->calibration();
   report.gyro_bias = filter_->gyroBias();
   report.gyro_time = std::exchange(gyro_time_, 0.0);
   report.stands = standstill_.stands(options_.standstill);
+  leaveTrail();
   carried_on_.reset();
   carryOn();
   report.total_time = secondsSince(begin);
@@ -254,6 +254,7 @@ void ScanOdometry::setOptions(const PipelineOptions& options) {
                                 "\", which only a new estimate can change");
   }
   modelledIncrement(SE2(), options.odometry_noise);  // throws if there is no such model
+  checkStates(options);
   options_ = options;
   matcher_ = ScanMatcher(options.matcher);
   reference_policy_.setOptions(options.reference);
@@ -262,8 +263,17 @@ void ScanOdometry::setOptions(const PipelineOptions& options) {
 }
 
 void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp) {
-  filter_ = makeFusionMethod(options_.method, odom_from_base, symmetric(covariance),
-                             statesFor(options_.calibration, options_.imu));  // (6)(7)
+  const StateOptions states = statesFor(options_.calibration, options_.imu);
+  map_ = nullptr;
+  if (options_.pose_updates.on) {
+    auto odom = std::make_unique<MultiCloneFilter>(odom_from_base, symmetric(covariance), states);
+    auto map = std::make_unique<MapFilter>(std::move(odom));
+    map_ = map.get();
+    filter_ = std::move(map);
+  } else {
+    filter_ = makeFusionMethod(options_.method, odom_from_base, symmetric(covariance), states);  // (6)(7)
+  }
+  trail_.clear();
   filter_stamp_ = stamp;
   odometry_.discardBefore(stamp);
   wheels_known_ = true;
@@ -293,6 +303,7 @@ void ScanOdometry::followAtADistance() {
   if (holds_back) too_old = std::min(too_old, waiting_.oldest());
   if (too_old <= filter_stamp_) return;
   const Stamp last = odometry_.lastUpTo(too_old);
+  takePoses(last);
   if (last > filter_stamp_) propagateTo(last);
   if (carried_on_stamp_ < filter_stamp_) carryOn();
 }
@@ -309,6 +320,11 @@ void ScanOdometry::propagateTo(Stamp stamp) {
   filter_stamp_ = stamp;
   odometry_.discardBefore(stamp);
   imu_.discardBefore(stamp);
+  leaveTrail();
+}
+
+void ScanOdometry::leaveTrail() {
+  if (map_ != nullptr) trail_.add(filter_stamp_, filter_->pose(), options_.max_scan_delay);
 }
 
 void ScanOdometry::useHeading(ScanReport& report) {

@@ -219,12 +219,13 @@ nav_msgs::Odometry toOdometryMessage(const Estimate& estimate, const std::string
   return message;
 }
 
-geometry_msgs::PoseWithCovarianceStamped toPoseMessage(const Estimate& estimate, const std::string& odom_frame) {
+geometry_msgs::PoseWithCovarianceStamped toPoseMessage(Stamp stamp, const SE2& pose, const Eigen::Matrix3d& covariance,
+                                                       const std::string& frame) {
   geometry_msgs::PoseWithCovarianceStamped message;
-  message.header.stamp = toTime(estimate.stamp);
-  message.header.frame_id = odom_frame;
-  message.pose.pose = toPose(estimate.odom_from_base);
-  message.pose.covariance = toMessageCovariance(estimate.covariance);
+  message.header.stamp = toTime(stamp);
+  message.header.frame_id = frame;
+  message.pose.pose = toPose(pose);
+  message.pose.covariance = toMessageCovariance(covariance);
   return message;
 }
 

@@ -38,7 +38,7 @@ void EstimatePublisher::publishTransform(const Estimate& estimate) {
 }
 
 void EstimatePublisher::publishScan(const Estimate& estimate, const PreparedScan* scan) {
-  pose_.publish(toPoseMessage(estimate, options_.odom_frame));
+  pose_.publish(toPoseMessage(estimate.stamp, estimate.odom_from_base, estimate.covariance, options_.odom_frame));
   path_recorder_.add(estimate.stamp, estimate.odom_from_base);
   if (scan != nullptr) {
     cloud_recorder_.add(estimate.odom_from_base, scan->points.point);

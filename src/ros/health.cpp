@@ -68,9 +68,18 @@ void Health::scanTaken(const ScanReport& report) {
   time_max_ = std::max(time_max_, report.total_time);
 }
 
+void Health::poseUpdateTaken(const PoseReport& report) {
+  if (poses_in_pipeline_ > 0) --poses_in_pipeline_;
+  pose_updates.ended(toString(report.outcome));
+  poses_contradicting_ = report.outcome == PoseOutcome::kContradicts ? poses_contradicting_ + 1 : 0;
+  last_pose_nis_ = report.nis;
+}
+
 void Health::pipelineDropped(const std::string& how, std::size_t odometry_jumps) {
   scans.ended(how, scans_in_pipeline_);
   scans_in_pipeline_ = 0;
+  pose_updates.ended(how, poses_in_pipeline_);
+  poses_in_pipeline_ = 0;
   reference_stamp_ = last_stamp_ = Stamp(0);
   odometry_jumps_before_ += odometry_jumps;
   unused_in_a_row_ = 0;
@@ -90,6 +99,7 @@ std::vector<Health::Finding> Health::report(const Conditions& conditions, const 
   addScans(conditions, now, status);
   addOdometry(conditions, now, status);
   if (options.pipeline.imu.isUsed()) addImu(conditions, now, status);
+  if (options.pipeline.pose_updates.on) addPoseUpdates(now, status);
   addEstimate(conditions, status);
   slips_reported_ = slips_;
   headings_contradicting_reported_ = headings_contradicting_;
@@ -134,6 +144,10 @@ std::vector<Health::Finding> Health::findings(const Conditions& conditions, cons
   if (imu_silence > imu_timeout) {
     warn("imu timeout", silenceOf("IMU", imu_silence, "imu_timeout", options.pipeline.imu.timeout) +
                             ": the estimate goes on without it");
+  }
+  if (poses_contradicting_ > 0) {
+    warn("pose updates", "the last " + std::to_string(poses_contradicting_) +
+                             " absolute poses contradict the estimate in " + options.node.map_frame);
   }
   if (headings_contradicting_ > headings_contradicting_reported_) {
     warn("heading", "the orientation of the IMU contradicts the estimate: not used");
@@ -189,6 +203,14 @@ void Health::addImu(const Conditions& conditions, const ros::Time& now, StatusWr
   status.addf("gyro bias [rad/s]", "%.5f +- %.5f", gyro_bias_.value, std::sqrt(gyro_bias_.variance));
   status.add("headings: used", headings_used_);
   status.add("headings: contradicting", headings_contradicting_);
+}
+
+void Health::addPoseUpdates(const ros::Time& now, StatusWrapper& status) {
+  status.add("pose updates: messages", pose_updates.received());
+  addEnds("pose updates", pose_updates, status);
+  status.add("pose updates: waiting", poses_in_pipeline_);
+  addRecent("pose updates", pose_updates.recent(now), status);
+  status.addf("pose updates: NIS", "%.3f", last_pose_nis_);
 }
 
 void Health::addCalibration(StatusWrapper& status) const {

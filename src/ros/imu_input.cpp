@@ -50,7 +50,7 @@ void ImuInput::ended(ImuBuffer::Insertion insertion) {
       refuse("too late", "it came after a scan that was taken later");
       return;
     case ImuBuffer::Insertion::kNotFinite:
-      refuse("no reading", "its values are not finite");
+      refuse("no reading", "its values are not finite, or larger than any can be");
       return;
   }
 }

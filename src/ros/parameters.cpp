@@ -127,6 +127,9 @@ void checkTogether(const Options& options, std::vector<std::string>& problems) {
   if (node.odom_frame == node.base_frame) {
     problems.push_back("odom_frame = \"" + node.odom_frame + "\": another frame than base_frame expected");
   }
+  if (node.map_frame == node.odom_frame || node.map_frame == node.base_frame) {
+    problems.push_back("map_frame = \"" + node.map_frame + "\": another frame than odom_frame and base_frame expected");
+  }
   if (node.use_tf_odometry && node.tf_odometry_frame == node.base_frame) {
     problems.push_back("tf_odometry_frame = \"" + node.tf_odometry_frame +
                        "\": another frame than base_frame expected");
@@ -171,7 +174,8 @@ Options readOptions(const ParameterSource& source, std::vector<std::string>* war
   }
   if (warnings != nullptr) *warnings = remarks;
   NodeOptions& node = options.node;
-  for (std::string* frame : {&node.odom_frame, &node.base_frame, &node.tf_odometry_frame}) *frame = frameName(*frame);
+  for (std::string* frame : {&node.odom_frame, &node.base_frame, &node.map_frame, &node.tf_odometry_frame})
+    *frame = frameName(*frame);
   checkTogether(options, problems);
   if (problems.empty()) return options;
   std::string text = "bad parameters:";

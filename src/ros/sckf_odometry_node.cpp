@@ -50,12 +50,14 @@ ScKfOdometryNode::ScKfOdometryNode(ros::NodeHandle nh, const ros::NodeHandle& pr
       tf_(options_.node.base_frame, options_.node.use_tf_odometry ? options_.node.tf_odometry_frame : "",
           toDuration(options_.node.time_jump)),
       publisher_(nh, options_.node),
+      map_publisher_(nh, options_),
       debug_view_(nh, options_.node),
       status_publisher_(nh.advertise<sckf_odometry::Status>("status", kQueue)),
       health_(odometry_source_, scan_topic_),
       pose_keeper_(options_.node),
       gate_(options_.node, odometry_source_, scan_topic_, health_, warnings_),
       imu_(options_.pipeline.imu, nh.resolveName("imu"), options_.node.time_jump, health_, warnings_),
+      pose_updates_(options_.node, nh.resolveName("pose_update"), health_, warnings_),
       diagnostics_(nh, private_nh, private_nh.getNamespace()),
       services_(nh, private_nh, serviceActions()),
       reconfigure_(private_nh, options_, [this](const Options& options) { onOptions(options); }) {
@@ -87,6 +89,9 @@ void ScKfOdometryNode::subscribe(ros::NodeHandle& nh) {
   }
   if (options_.pipeline.imu.isUsed()) {
     subscribers_.push_back(nh.subscribe("imu", queue, &ScKfOdometryNode::onImu, this, hints));
+  }
+  if (options_.pipeline.pose_updates.on) {
+    subscribers_.push_back(nh.subscribe("pose_update", queue, &ScKfOdometryNode::onPoseUpdate, this, hints));
   }
   subscribers_.push_back(options_.node.use_cloud_input
                              ? nh.subscribe("cloud_in", queue, &ScKfOdometryNode::onCloud, this, hints)
@@ -147,6 +152,17 @@ void ScKfOdometryNode::onImu(const sensor_msgs::Imu::ConstPtr& message) {
     for (const ImuSample& sample : imu_.admit(*message, gate_.newestOdometry(), tf_)) {
       paused_ ? imu_.ended("paused") : imu_.ended(pipeline_->addImu(sample));
     }
+    advance();
+  });
+}
+
+void ScKfOdometryNode::onPoseUpdate(const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& message) {
+  guarded([&] {
+    const std::optional<PoseUpdate> pose = pose_updates_.admit(*message);
+    if (!pose) return;
+    if (paused_) return health_.pose_updates.ended("paused");
+    pipeline_->addPose(*pose);
+    health_.poseUpdatePassed();
     advance();
   });
 }
@@ -215,7 +231,9 @@ void ScKfOdometryNode::addOdometry(const OdometrySample& sample) {
 
 void ScKfOdometryNode::advance() {
   passScansWithMount();
-  for (const ScanReport& report : pipeline_->process()) account(report);
+  const std::vector<ScanReport> reports = pipeline_->process();
+  accountPoses(!reports.empty());
+  for (const ScanReport& report : reports) account(report);
   if (paused_) return;
   if (const auto latest = pipeline_->latest()) publisher_.publish(*latest);
 }
@@ -251,6 +269,15 @@ void ScKfOdometryNode::account(const ScanReport& report) {
   if (!report.estimate) return;
   publisher_.publish(*report.estimate);
   publisher_.publishScan(*report.estimate, report.scan.get());
+  if (report.in_map) map_publisher_.publish(*report.in_map);
+}
+
+void ScKfOdometryNode::accountPoses(bool scans_were_taken) {
+  for (const PoseReport& report : pipeline_->takePoseReports()) {
+    pose_updates_.ended(report);
+    // Scans tell more, and later: without them the poses themselves tell when.
+    if (report.in_map && !scans_were_taken) map_publisher_.publish(*report.in_map);
+  }
 }
 
 void ScKfOdometryNode::warnOfSkew(const ScanReport& report) {
@@ -276,6 +303,7 @@ void ScKfOdometryNode::followTime(Stamp jump) {
   begin(SE2(), Eigen::Matrix3d::Zero(), "dropped, time went back");
   gate_.restart();
   imu_.restart();
+  map_publisher_.restart();
   publisher_.restart();
   if (!options_.node.use_tf_odometry) tf_.clear();  // there it has noticed by itself, and has begun anew already
 }
@@ -338,6 +366,9 @@ std::string ScKfOdometryNode::waitingFor() const {
   if (!scans_without_mount_.empty()) return "the mount of the laser: " + mount_problem_;
   if (health_.scans.received() == 0) return "scans on " + scan_topic_;
   if (options_.pipeline.imu.isUsed() && health_.imu.received() == 0) return "the IMU on " + imu_.topic();
+  if (options_.pipeline.pose_updates.on && health_.pose_updates.received() == 0) {
+    return "absolute poses on " + pose_updates_.topic();
+  }
   if (!imu_.mountProblem().empty()) return "the mount of the IMU: " + imu_.mountProblem();
   return "";
 }

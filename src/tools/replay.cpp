@@ -33,6 +33,8 @@ struct Arguments {
   std::string scan_topic;  // empty: the default of its kind
   std::string odom_topic = "/odom";
   std::string imu_topic = "/imu";
+  std::string pose_update_topic = "/pose_update";
+  std::string map_trajectory;
 };
 
 /// A file that is complete or not there: it gets its name when everything has been written.
@@ -79,10 +81,9 @@ std::string decimal(Stamp stamp) {
   return text;
 }
 
-void writeTumLine(OutputFile& file, const Estimate& estimate) {
-  const SE2& pose = estimate.odom_from_base;
-  file.print("%s %.9f %.9f 0 0 0 %.12f %.12f\n", decimal(estimate.stamp).c_str(), pose.x, pose.y,
-             std::sin(0.5 * pose.yaw), std::cos(0.5 * pose.yaw));
+void writeTumLine(OutputFile& file, Stamp stamp, const SE2& pose) {
+  file.print("%s %.9f %.9f 0 0 0 %.12f %.12f\n", decimal(stamp).c_str(), pose.x, pose.y, std::sin(0.5 * pose.yaw),
+             std::cos(0.5 * pose.yaw));
 }
 
 void writeCsvHeader(OutputFile& file) {
@@ -165,6 +166,7 @@ class Replay {
         tf_(options.node.base_frame, options.node.use_tf_odometry ? options.node.tf_odometry_frame : "",
             Stamp(std::chrono::seconds(1))),
         trajectory_(arguments.trajectory),
+        map_trajectory_(arguments.map_trajectory),
         csv_(arguments.csv) {
     if (arguments_.scan_topic.empty()) arguments_.scan_topic = takesClouds() ? "/cloud_in" : "/scan";
     if (csv_) writeCsvHeader(csv_);
@@ -178,7 +180,7 @@ class Replay {
       throw std::runtime_error(arguments_.bag + ": " + exception.what());
     }
     rosbag::View view(bag, rosbag::TopicQuery({"/tf", "/tf_static", arguments_.scan_topic, arguments_.odom_topic,
-                                               arguments_.imu_topic}));
+                                               arguments_.imu_topic, arguments_.pose_update_topic}));
     const auto begin = std::chrono::steady_clock::now();
     ProgressBar progress(view.size());
     for (const rosbag::MessageInstance& message : view) {
@@ -196,6 +198,7 @@ class Replay {
                    mount_problem_.c_str());
     }
     trajectory_.finish();
+    map_trajectory_.finish();
     csv_.finish();
     const double log_duration = view.size() > 0 ? (view.getEndTime() - view.getBeginTime()).toSec() : 0.0;
     statistics_.print(log_duration, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
@@ -212,6 +215,8 @@ class Replay {
       addOdometry(*odometry);
     } else if (const auto imu = message.instantiate<sensor_msgs::Imu>()) {
       addImu(*imu);
+    } else if (const auto pose = message.instantiate<geometry_msgs::PoseWithCovarianceStamped>()) {
+      addPose(*pose);
     } else if (const auto cloud = message.instantiate<sensor_msgs::PointCloud2>(); cloud && takesClouds()) {
       addCloud(cloud);
     } else if (const auto scan = message.instantiate<sensor_msgs::LaserScan>(); scan && !takesClouds()) {
@@ -256,6 +261,16 @@ class Replay {
     }
   }
 
+  void addPose(const geometry_msgs::PoseWithCovarianceStamped& message) {
+    if (!options_.pipeline.pose_updates.on) return;
+    std::string problem;
+    if (const auto pose = toGivenPose(message, options_.node.map_frame, &problem)) {
+      pipeline_.addPose({pose->stamp, {pose->odom_from_base, pose->covariance}});
+    } else {
+      std::fprintf(stderr, "pose at %.9f not used: %s\n", message.header.stamp.toSec(), problem.c_str());
+    }
+  }
+
   void passScansWithMount() {
     while (!waiting_.empty()) {
       const auto mount = tf_.baseFrom(frameName(waiting_.front().header.frame_id), &mount_problem_);
@@ -270,9 +285,15 @@ class Replay {
     const auto begin = std::chrono::steady_clock::now();
     const std::vector<ScanReport> reports = pipeline_.process();
     const double time = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    for (const PoseReport& report : pipeline_.takePoseReports()) {
+      if (report.reason.empty()) continue;
+      std::fprintf(stderr, "pose at %s not used: %s: %s\n", decimal(report.stamp).c_str(),
+                   toString(report.outcome).c_str(), report.reason.c_str());
+    }
     for (const ScanReport& report : reports) {
       statistics_.add(report, time / static_cast<double>(reports.size()));
-      if (trajectory_ && report.estimate) writeTumLine(trajectory_, *report.estimate);
+      if (trajectory_ && report.estimate) writeTumLine(trajectory_, report.stamp, report.estimate->odom_from_base);
+      if (map_trajectory_ && report.in_map) writeTumLine(map_trajectory_, report.stamp, report.in_map->map_from_base);
       if (csv_) writeCsvLine(csv_, report);
     }
   }
@@ -282,6 +303,7 @@ class Replay {
   ScanOdometry pipeline_;
   TfInput tf_;
   OutputFile trajectory_;
+  OutputFile map_trajectory_;
   OutputFile csv_;
   Statistics statistics_;
   std::deque<RangeMessage> waiting_;  // for their mount
@@ -303,6 +325,9 @@ std::optional<Arguments> parse(int argc, char** argv) {
     ("method", po::value(&arguments.method), "instead of the parameter file's method")
     ("scan-topic", po::value(&arguments.scan_topic), "(=/scan, or /cloud_in with the parameter use_cloud_input)")
     ("odom-topic", po::value(&arguments.odom_topic)->default_value(arguments.odom_topic), "")
+    ("map-trajectory", po::value(&arguments.map_trajectory), "write the poses in map at the scans, in the format of TUM")
+    ("pose-update-topic", po::value(&arguments.pose_update_topic)->default_value(arguments.pose_update_topic),
+     "with the parameter use_pose_updates")
     ("imu-topic", po::value(&arguments.imu_topic)->default_value(arguments.imu_topic), "with the parameter use_imu");
   // clang-format on
   po::options_description all(shown);

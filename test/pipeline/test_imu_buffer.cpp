@@ -80,6 +80,7 @@ TEST_F(ImuBufferTest, WhatIsNoReadingIsRefused) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(imu_.insert({at(0), nan, 0.0}), Insertion::kNotFinite);
   EXPECT_EQ(imu_.insert({at(0), 0.0, std::numeric_limits<double>::infinity()}), Insertion::kNotFinite);
+  EXPECT_EQ(imu_.insert({at(0), 1e300, 0.0}), Insertion::kNotFinite);
   EXPECT_EQ(imu_.insert({Stamp(-1), 0.0, 0.0}), Insertion::kNotFinite);
   EXPECT_TRUE(imu_.empty());
 }

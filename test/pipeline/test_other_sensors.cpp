@@ -84,7 +84,8 @@ TEST(OtherSensors, MethodsWithoutSuchStatesRefuseThemByName) {
     PipelineOptions options = withMethod(method);
     const std::vector<std::pair<std::string, bool*>> switches{{"calibrate_odometry", &options.calibration.on},
                                                               {"use_imu", &options.imu.gyro},
-                                                              {"use_imu_orientation", &options.imu.orientation}};
+                                                              {"use_imu_orientation", &options.imu.orientation},
+                                                              {"use_pose_updates", &options.pose_updates.on}};
     for (const auto& [parameter, is_on] : switches) {
       *is_on = true;
       if (method == "sckf_multi") {
@@ -94,6 +95,8 @@ TEST(OtherSensors, MethodsWithoutSuchStatesRefuseThemByName) {
       }
       *is_on = false;
     }
+    options.standstill.time = 1.0;
+    if (method != "sckf_multi") expectRefused(options, "standstill_time is 1");
   }
 }
 

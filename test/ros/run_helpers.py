@@ -64,13 +64,14 @@ class Recorder:
     TOPICS = {
         'odometry/filtered': Odometry,
         'pose': PoseWithCovarianceStamped,
+        'pose_in_map': PoseWithCovarianceStamped,
         'path': Path,
         'path_odometry': Path,
         'cloud': PointCloud2,
         'status': Status,
     }
 
-    def __init__(self, namespace='', node_name='sckf_odometry'):
+    def __init__(self, namespace='', node_name='sckf_odometry', in_map=False):
         self._lock = threading.Lock()
         self._messages = {topic: [] for topic in self.TOPICS}
         self._transforms = []
@@ -80,7 +81,7 @@ class Recorder:
         self._node_name = node_name
         self._subscribers = [
             rospy.Subscriber(namespace + topic, kind, self._record, topic, queue_size=None, tcp_nodelay=True)
-            for topic, kind in self.TOPICS.items()
+            for topic, kind in self.TOPICS.items() if in_map or topic != 'pose_in_map'
         ]
         rospy.Subscriber('/tf', TFMessage, self._record_transforms, False, queue_size=None)
         rospy.Subscriber('/tf_static', TFMessage, self._record_transforms, True, queue_size=None)

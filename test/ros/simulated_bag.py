@@ -10,7 +10,7 @@ import math
 import numpy as np
 import rosbag
 import rospy
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs import point_cloud2
 from sensor_msgs.msg import Imu, LaserScan
@@ -20,6 +20,8 @@ from tf2_msgs.msg import TFMessage
 START = 1000.0  # [s], time of the first message
 ODOMETRY_RATE = 20.0  # [1/s]
 IMU_RATE = 100.0  # [1/s]
+MAP_FROM_ODOM = np.array([10.0, -5.0, 1.0])
+POSE_STD = 0.05  # [m, rad] of the absolute poses
 SCAN_PERIOD = 0.23  # [s]: no multiple of that of the odometry, so that odometry has to be interpolated
 
 # A room with a niche, two boxes and a slanted wall: no two views of it are alike.
@@ -204,14 +206,28 @@ def mount_message(stamp, *mounts):
     return TFMessage(transforms)
 
 
+def pose_update(t, rng):
+    """Where the robot is in map t seconds after the start, but for noise."""
+    x, y, yaw = compose(MAP_FROM_ODOM, between(truth(0.0), truth(t))) + POSE_STD * rng.normal(size=3)
+    message = PoseWithCovarianceStamped()
+    message.header.stamp, message.header.frame_id = rospy.Time.from_sec(START + t), 'map'
+    message.pose.pose.position.x, message.pose.pose.position.y = x, y
+    message.pose.pose.orientation.z, message.pose.pose.orientation.w = math.sin(yaw / 2), math.cos(yaw / 2)
+    for axis in (0, 1, 5):
+        message.pose.covariance[7 * axis] = POSE_STD**2
+    return message
+
+
 def true_trajectory(stamps, path=truth):
     """Pose of base_link at these stamps [s] in the frame of its start: what a perfect estimator would say."""
     return np.array([between(path(0.0), path(stamp - START)) for stamp in stamps])
 
 
-def messages(duration=45.0, mount=None, seed=1, beams=360, imu=None, path=truth, time_increment=0.0, clouds=False):
+def messages(duration=45.0, mount=None, seed=1, beams=360, imu=None, path=truth, time_increment=0.0, clouds=False,
+             poses=False):
     """(topic, message, stamp) in the order of time; with an ImuUnit its messages at IMU_RATE, too. time_increment: [s] from
-    one beam to the next. clouds: of points, in the place of scans."""
+    one beam to the next. clouds: of points, in the place of scans. poses: absolute ones in map, too, each second
+    from the third on."""
     mount = mount or Mount(x=0.2)
     rng = np.random.default_rng(seed)
     segments = walls()
@@ -233,6 +249,8 @@ def messages(duration=45.0, mount=None, seed=1, beams=360, imu=None, path=truth,
     if imu:
         stamps = np.arange(int(duration * IMU_RATE)) / IMU_RATE
         out += [('/imu', imu.message(t, rng), START + t) for t in stamps]
+    if poses:
+        out += [('/pose_update', pose_update(t, rng), START + t) for t in np.arange(3.0, duration)]
     return sorted(out, key=lambda entry: entry[2])
 
 

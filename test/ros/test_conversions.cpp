@@ -170,7 +170,7 @@ TEST(Conversions, TransformsAndPosesSayTheSame) {
   EXPECT_EQ(transform.header.frame_id, "odom");
   EXPECT_EQ(transform.child_frame_id, "base_link");
   EXPECT_NEAR(error(*toPlanar(transform.transform, nullptr), estimate.odom_from_base).norm(), 0.0, 1e-12);
-  const auto pose = toPoseMessage(estimate, "odom");
+  const auto pose = toPoseMessage(estimate.stamp, estimate.odom_from_base, estimate.covariance, "odom");
   EXPECT_EQ(pose.header.stamp, transform.header.stamp);
   EXPECT_NEAR(error(*toPlanar(pose.pose.pose, nullptr), estimate.odom_from_base).norm(), 0.0, 1e-12);
 }
@@ -264,6 +264,10 @@ TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
   report.older_references = 2;
   report.calibration.error << 0.03, -0.02, 0.01;
   report.calibration.covariance = Eigen::Vector3d(1e-4, 4e-4, 9e-4).asDiagonal();
+  report.gyro_bias = {0.01, 4e-6};
+  report.gyro_time = 0.1;
+  report.heading = HeadingUse::kContradicts;
+  report.stands = true;
   report.match_time = 0.001;
   report.total_time = 0.002;
   const auto status = toStatus(report, "sckf", "odom", ros::Time(7.5));
@@ -287,6 +291,11 @@ TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
   EXPECT_NEAR(status.calibration_distance_std, 0.01, 1e-12);
   EXPECT_NEAR(status.calibration_rotation_std, 0.02, 1e-12);
   EXPECT_NEAR(status.calibration_rotation_per_meter_std, 0.03, 1e-12);
+  EXPECT_EQ(status.gyro_bias, 0.01);
+  EXPECT_NEAR(status.gyro_bias_std, 0.002, 1e-12);
+  EXPECT_EQ(status.gyro_time, 0.1);
+  EXPECT_EQ(status.heading, "contradicts");
+  EXPECT_TRUE(status.stands);
   EXPECT_EQ(status.match_time, 0.001);
   EXPECT_EQ(status.total_time, 0.002);
   EXPECT_NEAR(status.latency, 0.5, 1e-9);

@@ -198,5 +198,40 @@ TEST_F(HealthTest, TheErrorsOfTheWheelsAreToldWhereTheyAreEstimated) {
   EXPECT_EQ(value("error of the wheels: rotation per meter [rad/m]"), "0.0100 +- 0.0300");
 }
 
+TEST_F(HealthTest, AnImuThatIsSilentIsAWarningAndNoMore) {
+  options_.pipeline.imu.gyro = true;
+  health_.imu.came(at(100.0), at(100.0));
+  EXPECT_EQ(verdictAt(100.4).level, Level::OK);
+  const Verdict verdict = verdictAt(100.8);
+  EXPECT_EQ(verdict.level, Level::WARN);
+  EXPECT_EQ(verdict.text, "no IMU for 0.8 s (~imu_timeout: 0.5 s): the estimate goes on without it");
+}
+
+TEST_F(HealthTest, AHeadingThatContradictsIsAWarningOnce) {
+  options_.pipeline.imu.orientation = true;
+  ScanReport report = scan(ScanOutcome::kUpdated, 100.1);
+  report.heading = HeadingUse::kContradicts;
+  report.gyro_bias = {0.01, 4e-6};
+  health_.scanTaken(report);
+  EXPECT_TRUE(contains(verdictAt(100.2).text, "the orientation of the IMU contradicts"));
+  EXPECT_EQ(value("headings: contradicting"), "1");
+  EXPECT_EQ(value("gyro bias [rad/s]"), "0.01000 +- 0.00200");
+  EXPECT_EQ(verdictAt(100.3).level, Level::OK);
+}
+
+TEST_F(HealthTest, AbsolutePosesThatContradictAreAWarningUntilOneDoesNot) {
+  options_.pipeline.pose_updates.on = true;
+  PoseReport report;
+  report.outcome = PoseOutcome::kContradicts;
+  for (int i = 0; i < 3; ++i) health_.poseUpdatePassed();
+  for (int i = 0; i < 2; ++i) health_.poseUpdateTaken(report);
+  EXPECT_TRUE(contains(verdictAt(100.2).text, "the last 2 absolute poses contradict the estimate in map"));
+  EXPECT_EQ(value("pose updates: contradicts"), "2");
+  EXPECT_EQ(value("pose updates: waiting"), "1");
+  report.outcome = PoseOutcome::kUsed;
+  health_.poseUpdateTaken(report);
+  EXPECT_EQ(verdictAt(100.3).level, Level::OK);
+}
+
 }  // namespace
 }  // namespace sckf

@@ -1,6 +1,8 @@
 #!/usr/bin/python3
-"""An IMU, and wheels whose systematic errors are found, in a drive of which the laser sees the first part only."""
+"""An IMU, absolute poses, and wheels whose systematic errors are found, in a drive of which the laser sees the first part
+only."""
 
+import math
 import unittest
 
 import numpy as np
@@ -54,24 +56,39 @@ def bad_imu_messages(stamp):
             (not_measured, '')]  # of the kind of the one before, which is said once in a while
 
 
+def bad_pose_updates():
+    """Poses that are refused, and what is said of them."""
+    rng = np.random.default_rng(6)
+    no_stamp, other_frame, no_covariance = (simulated_bag.pose_update(0.0, rng) for _ in range(3))
+    no_stamp.header.stamp = rospy.Time()
+    other_frame.header.frame_id = 'world'
+    no_covariance.pose.covariance = 36 * [0.0]
+    return [(no_stamp, 'header.stamp is 0'), (other_frame, 'header.frame_id is "world": "map" expected'),
+            (no_covariance, 'a positive definite covariance expected')]
+
+
 class OtherSensors(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.recorder = helpers.Recorder()
+        cls.recorder = helpers.Recorder(in_map=True)
         cls.loader = helpers.load_nodelet(MANAGER, NODE, max_scan_delay=10000, calibrate_odometry=True, use_imu=True,
                                           use_imu_orientation=True, imu_orientation_std=0.02, standstill_time=1.0,
-                                          odometry_yaw_per_meter=0.05)
+                                          odometry_yaw_per_meter=0.05, use_pose_updates=True, publish_map_tf=True)
         helpers.wait_for_subscriber('/scan')
         cls.recorder.wait_for_connection()
         cls.imu = simulated_bag.ImuUnit()
-        everything = simulated_bag.messages(duration=DURATION, imu=cls.imu)
+        everything = simulated_bag.messages(duration=DURATION, imu=cls.imu, poses=True)
+        beside = [message for topic, message, _ in everything if topic == '/pose_update'][7]
+        beside.pose.pose.position.x += 3.0
         end = simulated_bag.START + SEEING
         cls.messages = [entry for entry in everything if entry[0] != '/scan' or entry[2] < end]
-        cls.feeder = helpers.Feeder(['/odom', '/scan', '/imu', '/tf_static'])
+        cls.feeder = helpers.Feeder(['/odom', '/scan', '/imu', '/pose_update', '/tf_static'])
         cls.feeder.feed([entry for entry in cls.messages if entry[0] == '/tf_static'])
         cls.bad = bad_imu_messages(simulated_bag.START)
         cls.feeder.feed([('/imu', message, simulated_bag.START) for message, _ in cls.bad])
+        cls.bad_poses = bad_pose_updates()
+        cls.feeder.feed([('/pose_update', message, simulated_bag.START) for message, _ in cls.bad_poses])
         cls.feeder.feed([entry for entry in cls.messages if entry[0] != '/tf_static'], SPEED)
         cls.wait_for_odometry(simulated_bag.START + DURATION)
         cls.driven = cls.recorder.messages('odometry/filtered')
@@ -144,6 +161,61 @@ class OtherSensors(unittest.TestCase):
         for _, expected in self.bad:
             self.assertTrue(self.recorder.log(expected), expected)
         self.assertEqual(int(self.recorder.diagnostics()['imu: refused']), len(self.bad))
+
+    def transforms(self, child):
+        """Stamps [s], and n × 3 poses."""
+        found = [t for t in self.recorder.transforms(False) if t.child_frame_id == child]
+        poses = [[t.transform.translation.x, t.transform.translation.y,
+                  2 * math.atan2(t.transform.rotation.z, t.transform.rotation.w)] for t in found]
+        return np.array([t.header.stamp.to_sec() for t in found]), np.array(poses)
+
+    def test_the_pose_in_map_is_where_the_robot_is(self):
+        messages = self.recorder.messages('pose_in_map')
+        self.assertGreater(len(messages), 0.9 * (SEEING - 4.0) / simulated_bag.SCAN_PERIOD)
+        self.assertGreater(np.diff([m.header.stamp.to_nsec() for m in messages]).min(), 0)
+        for message in messages:
+            self.assertEqual(message.header.frame_id, 'map')
+            t = message.header.stamp.to_sec() - simulated_bag.START
+            moved = simulated_bag.between(simulated_bag.truth(0.0), simulated_bag.truth(t))
+            error = helpers.planar(message.pose.pose) - simulated_bag.compose(simulated_bag.MAP_FROM_ODOM, moved)
+            self.assertLess(np.abs([error[0], error[1], helpers.wrap(error[2])]).max(), 0.2, t)
+            std = np.sqrt(np.diag(helpers.covariance(message)))
+            self.assertTrue((std > 1e-4).all() and (std < 0.2).all(), std)
+
+    def test_the_transforms_of_map_and_odom_give_the_pose_in_map(self):
+        map_stamps, map_from_odom = self.transforms('odom')
+        odom_stamps, odom_from_base = self.transforms('base_link')
+        self.assertGreater(len(map_stamps), 50)
+        self.assertGreater(np.diff(map_stamps).min(), 0.0)
+        poses = {m.header.stamp.to_sec(): helpers.planar(m.pose.pose) for m in self.recorder.messages('pose_in_map')}
+        both = [(stamp, i) for i, stamp in enumerate(map_stamps) if np.abs(odom_stamps - stamp).min() < 1e-6]
+        self.assertGreater(len(both), 30)
+        for stamp, i in both:
+            there = simulated_bag.compose(map_from_odom[i], odom_from_base[np.abs(odom_stamps - stamp).argmin()])
+            error = there - poses[stamp]
+            # What TF says at that stamp may have been published before the scan was taken.
+            self.assertLess(np.abs([error[0], error[1], helpers.wrap(error[2])]).max(), 0.05)
+
+    def test_odom_does_not_jump_where_map_does(self):
+        stamps, poses = self.transforms('base_link')
+        true = np.array([simulated_bag.truth(t) for t in stamps - simulated_bag.START])
+        jump = max(np.hypot(*(simulated_bag.between(a, b) - simulated_bag.between(c, d))[:2])
+                   for a, b, c, d in zip(poses, poses[1:], true, true[1:]) if stamps[0] < simulated_bag.START + SEEING)
+        self.assertLess(jump, 0.05)
+        map_from_odom = self.transforms('odom')[1]
+        self.assertGreater(np.abs(np.diff(map_from_odom, axis=0)).max(), 0.01, 'nothing jumps at all')
+
+    def test_every_absolute_pose_is_accounted_for(self):
+        diagnostics = self.recorder.diagnostics()
+        came = sum(topic == '/pose_update' for topic, _, _ in self.messages)
+        self.assertEqual(int(diagnostics['pose updates: messages']), came + len(self.bad_poses))
+        self.assertEqual(int(diagnostics['pose updates: refused']), len(self.bad_poses))
+        self.assertEqual(int(diagnostics['pose updates: entered']), 1)
+        self.assertGreaterEqual(int(diagnostics['pose updates: contradicts']), 1)
+        self.assertGreaterEqual(int(diagnostics['pose updates: used']), came - 8 - int(diagnostics['pose updates: waiting']))
+        for _, expected in self.bad_poses:
+            self.assertTrue(self.recorder.log(expected), expected)
+        self.assertTrue(self.recorder.log('contradicts: normalised innovation squared'))
 
 
 if __name__ == '__main__':

@@ -146,6 +146,7 @@ TEST(Parameters, ValuesThatContradictEachOtherAreRefused) {
   EXPECT_TRUE(contains(refusal("range_noise_min: 0.2\n"), "range_noise_min = 0.2: less than range_noise_max"));
   EXPECT_TRUE(
       contains(refusal("odom_frame: base_link\n"), "odom_frame = \"base_link\": another frame than base_frame"));
+  EXPECT_TRUE(contains(refusal("map_frame: /odom\n"), "map_frame = \"odom\": another frame than odom_frame and base"));
 }
 
 TEST(Parameters, UnknownNamesAreToldAndChangeNothing) {

@@ -85,6 +85,21 @@ class ReplayTest(unittest.TestCase):
 
     # ---- what it writes
 
+    def test_absolute_poses_and_an_imu_of_the_bag_are_used_if_asked_for(self) -> None:
+        bag, params, out = self.path("others.bag"), self.path("others.yaml"), self.path("others.tum")
+        in_map = self.path("in_map.tum")
+        simulated_bag.write(str(bag), duration=DURATION, imu=simulated_bag.ImuUnit(), poses=True)
+        params.write_text("use_imu: true\nuse_pose_updates: true\n", encoding="utf-8")
+        self.replay(bag, "--trajectory", out, "--params", params, "--map-trajectory", in_map)
+        with_imu = out.read_bytes()
+        self.replay(bag, "--trajectory", out)
+        self.assertNotEqual(with_imu, out.read_bytes())
+        trajectory = read_tum(in_map)
+        true = np.array([simulated_bag.compose(simulated_bag.MAP_FROM_ODOM, pose)
+                         for pose in simulated_bag.true_trajectory(trajectory.stamps)])
+        self.assertGreater(len(true), 30)
+        self.assertLess(np.abs(trajectory.poses[:, :2] - true[:, :2]).max(), 0.2)
+
     def test_the_trajectory_has_every_scan_and_is_right(self) -> None:
         scans = [stamp for topic, _, stamp in simulated_bag.messages(DURATION) if topic == "/scan"]
         trajectory = self.trajectory()

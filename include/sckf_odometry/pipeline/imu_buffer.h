@@ -24,7 +24,7 @@ class ImuBuffer {
     kInserted,
     kDuplicate,  ///< there is a reading of this stamp already
     kTooOld,     ///< older than what has been used
-    kNotFinite,  ///< a value is no number, or its stamp no time
+    kNotFinite,  ///< a value is no number, or larger than any can be, or its stamp no time
   };
 
   /// longest_gap: [s] nothing is interpolated between readings that are farther apart.

@@ -22,6 +22,7 @@ enum class PoseOutcome {
   kContradicts,  ///< it contradicts the estimate beyond the gate: not used
   kTooLate,      ///< its time is past, and forgotten: not used
   kNoOdometry,   ///< no odometry came for its stamp: not used
+  kNoPose,       ///< its numbers are none, or its covariance is not positive definite: not used
 };
 std::string toString(PoseOutcome outcome);
 

@@ -14,6 +14,7 @@
 #include "sckf_odometry/pipeline/imu_buffer.h"
 #include "sckf_odometry/pipeline/odometry_buffer.h"
 #include "sckf_odometry/pipeline/other_sensors.h"
+#include "sckf_odometry/pipeline/pose_updates.h"
 #include "sckf_odometry/pipeline/reference_policy.h"
 #include "sckf_odometry/pipeline/reference_scans.h"
 #include "sckf_odometry/pipeline/scan_report.h"
@@ -38,6 +39,7 @@ struct PipelineOptions {
   CalibrationOptions calibration;
   ImuOptions imu;
   StandstillOptions standstill;
+  PoseUpdateOptions pose_updates;
   bool prefer_twist_covariance = false;  ///< use the twist covariance of the odometry message where it is sensible
   ScanOptions scan;
   bool deskew = false;  ///< undo the motion while a scan is taken; it waits for odometry at its last beam then
@@ -75,6 +77,14 @@ class ScanOdometry {
   /// time of the scan.
   void addScan(LaserScan scan, const Eigen::Isometry3d& base_from_laser);
 
+  /// An absolute pose corrects the estimate in map, and never the one in odom. It waits for the scans that are older,
+  /// but no longer than they may be late, and for odometry at its stamp; one whose time is past by no more than scans
+  /// may be late is brought forward by the motion since. What is no pose is reported so.
+  void addPose(const PoseUpdate& pose);
+
+  /// What became of the absolute poses, by process() and by addPose(), since the last call.
+  std::vector<PoseReport> takePoseReports();
+
   /// Takes the scans whose time has come, oldest first, and says what became of each.
   std::vector<ScanReport> process();
 
@@ -87,7 +97,7 @@ class ScanOdometry {
   void setPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp);
 
   /// From the next scan on; the estimate and its reference stay. Throws std::invalid_argument if the method differs, or
-  /// there is no odometry model of that name.
+  /// lacks what the options ask for, or there is no odometry model of that name.
   void setOptions(const PipelineOptions& options);
 
   /// The wheels are silent: the scans carry on alone, or wait, as options.scans_alone says.
@@ -110,7 +120,12 @@ class ScanOdometry {
   bool looksLikeSlip(const Match& match) const;
   ScanMotion motionDuring(const WaitingScans::Entry& waiting) const;
   void propagateTo(Stamp stamp);
+  void leaveTrail();
   void useHeading(ScanReport& report);
+  void takePoses(Stamp up_to);
+  PoseReport take(const PoseUpdate& pose);
+  std::optional<PoseMeasurement> broughtForward(const PoseUpdate& pose) const;
+  std::optional<MapEstimate> inMap() const;
   void carryOn();
   bool imuTells(Stamp stamp) const;
   Stamp settled() const;
@@ -134,6 +149,9 @@ class ScanOdometry {
   TwistWindow twist_;
   SweepCheck sweeps_;
   WaitingScans waiting_;
+  WaitingPoses waiting_poses_;
+  std::vector<PoseReport> pose_reports_;
+  Trail trail_;  // of filter_, where absolute poses are used
   std::vector<ScanReport> given_up_;
   std::optional<Stamp> wheels_heard_;  // the newest stamp of odometry, used or not
   Stamp motion_known_{0};              // until here the motion has been measured
@@ -141,6 +159,7 @@ class ScanOdometry {
   SE2 start_;  // odom_from_base before there is a filter
   Eigen::Matrix3d start_covariance_;
   std::unique_ptr<FusionMethod> filter_;  // at filter_stamp_; null before the first odometry
+  MapFilter* map_ = nullptr;              // filter_, where absolute poses are used
   Stamp filter_stamp_{0};
   bool wheels_known_ = true;  // since the last scan
   double gyro_time_ = 0.0;    // [s] measured by a gyro, since then

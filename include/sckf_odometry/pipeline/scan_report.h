@@ -6,6 +6,7 @@
 #include <string>
 
 #include "sckf_odometry/matching/scan_matcher.h"
+#include "sckf_odometry/pipeline/pose_updates.h"
 #include "sckf_odometry/pipeline/sweep.h"
 #include "sckf_odometry/pipeline/twist_window.h"
 
@@ -61,6 +62,7 @@ struct ScanReport {
   double gyro_time = 0.0;                    ///< [s] since the estimate before, that the gyro has measured
   HeadingUse heading = HeadingUse::kNone;    ///< of the IMU, at the scan's stamp
   bool stands = false;                       ///< the wheels have told of no motion for some time
+  std::optional<MapEstimate> in_map;         ///< then; empty before the first absolute pose
   Deskewing deskewing = Deskewing::kOff;     ///< what became of the motion during the scan
   std::string deskewing_problem;             ///< in words, where it could not be undone
   double match_time = 0.0;                   ///< [s] spent on the comparison with the reference …

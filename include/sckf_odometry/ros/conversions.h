@@ -76,7 +76,8 @@ constexpr double kVarianceOutOfPlane = 1e-6;
 /// Pose in odom_frame, twist in base_frame.
 nav_msgs::Odometry toOdometryMessage(const Estimate& estimate, const std::string& odom_frame,
                                      const std::string& base_frame);
-geometry_msgs::PoseWithCovarianceStamped toPoseMessage(const Estimate& estimate, const std::string& odom_frame);
+geometry_msgs::PoseWithCovarianceStamped toPoseMessage(Stamp stamp, const SE2& pose, const Eigen::Matrix3d& covariance,
+                                                       const std::string& frame);
 geometry_msgs::PoseStamped toPoseStamped(const SE2& pose, Stamp stamp, const std::string& frame);
 
 /// Points in the plane of the frame.

@@ -40,11 +40,14 @@ class Health {
 
   MessageTally odometry;
   MessageTally scans;
-  MessageTally imu;  ///< if it is used
+  MessageTally imu;           ///< if it is used
+  MessageTally pose_updates;  ///< if they are used
 
   /// The scan went to the pipeline, and will be reported, unless the pipeline is dropped before.
   void scanPassed() { ++scans_in_pipeline_; }
   void scanTaken(const ScanReport& report);
+  void poseUpdateTaken(const PoseReport& report);
+  void poseUpdatePassed() { ++poses_in_pipeline_; }
   void pipelineDropped(const std::string& how, std::size_t odometry_jumps);
 
   void timeJumped(double by) { ++(by < 0.0 ? jumps_back_ : jumps_ahead_); }
@@ -62,11 +65,15 @@ class Health {
                    diagnostic_updater::DiagnosticStatusWrapper& status);
   void addEstimate(const Conditions& conditions, diagnostic_updater::DiagnosticStatusWrapper& status) const;
   void addImu(const Conditions& conditions, const ros::Time& now, diagnostic_updater::DiagnosticStatusWrapper& status);
+  void addPoseUpdates(const ros::Time& now, diagnostic_updater::DiagnosticStatusWrapper& status);
   void addCalibration(diagnostic_updater::DiagnosticStatusWrapper& status) const;
 
   std::string odometry_source_;
   std::string scan_topic_;
   std::size_t scans_in_pipeline_ = 0;
+  std::size_t poses_in_pipeline_ = 0;
+  std::size_t poses_contradicting_ = 0;  // in a row
+  double last_pose_nis_ = 0.0;
   std::size_t jumps_back_ = 0;
   std::size_t jumps_ahead_ = 0;
 

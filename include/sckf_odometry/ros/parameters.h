@@ -18,8 +18,10 @@ struct NodeOptions {
   std::string odom_frame = "odom";       ///< frame of the estimate
   std::string base_frame = "base_link";  ///< frame of the robot
   bool publish_tf = true;                ///< publish odom_frame → base_frame on TF
-  bool invert_odom_tf = false;   ///< publish base_frame → odom_frame: where base_frame has another parent already
-  bool use_tf_odometry = false;  ///< read wheel odometry from TF instead of the topic odom
+  bool invert_odom_tf = false;    ///< publish base_frame → odom_frame: where base_frame has another parent already
+  std::string map_frame = "map";  ///< frame of absolute poses
+  bool publish_map_tf = false;    ///< publish map_frame → odom_frame on TF, where absolute poses are used
+  bool use_tf_odometry = false;   ///< read wheel odometry from TF instead of the topic odom
   std::string tf_odometry_frame = "odom";  ///< frame of the wheel odometry on TF
   bool use_cloud_input = false;            ///< take clouds of points instead of scans
   CloudOptions cloud_input;                ///< … and these of their points

@@ -24,7 +24,9 @@
 #include "sckf_odometry/ros/health.h"
 #include "sckf_odometry/ros/imu_input.h"
 #include "sckf_odometry/ros/input_gate.h"
+#include "sckf_odometry/ros/map_publisher.h"
 #include "sckf_odometry/ros/parameters.h"
+#include "sckf_odometry/ros/pose_update_input.h"
 #include "sckf_odometry/ros/reconfigure.h"
 #include "sckf_odometry/ros/services.h"
 #include "sckf_odometry/ros/state_file.h"
@@ -33,9 +35,9 @@
 
 namespace sckf {
 
-/// Subscribes to scan or cloud_in, to odom (nav_msgs/Odometry) or TF and, if asked for, to imu, publishes what
-/// EstimatePublisher and DebugView say, status and diagnostics, and serves what Services and Reconfigure say. Its
-/// callbacks may come from any number of threads.
+/// Subscribes to scan or cloud_in, to odom (nav_msgs/Odometry) or TF and, if asked for, to imu and pose_update,
+/// publishes what EstimatePublisher and DebugView say, status and diagnostics, and serves what Services and Reconfigure
+/// say. Its callbacks may come from any number of threads.
 class ScKfOdometryNode {
  public:
   /// Throws std::invalid_argument if a parameter is bad: parameter, value, what is allowed.
@@ -54,6 +56,7 @@ class ScKfOdometryNode {
   void onScan(const sensor_msgs::LaserScan::ConstPtr& message);
   void onCloud(const sensor_msgs::PointCloud2::ConstPtr& message);
   void onImu(const sensor_msgs::Imu::ConstPtr& message);
+  void onPoseUpdate(const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& message);
   void onOdometry(const nav_msgs::Odometry::ConstPtr& message);
   void onTransforms(const ros::MessageEvent<const tf2_msgs::TFMessage>& event, bool is_static);
   void onOptions(const Options& options);
@@ -73,6 +76,7 @@ class ScKfOdometryNode {
   void passScansWithMount();
   void account(const ScanReport& report);
   void warnOfSkew(const ScanReport& report);
+  void accountPoses(bool scans_were_taken);
 
   /// A new estimate begins at a pose; what waits is dropped, for a reason in words.
   void begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, const std::string& reason);
@@ -92,6 +96,7 @@ class ScKfOdometryNode {
   std::unique_ptr<ScanOdometry> pipeline_;
   TfInput tf_;
   EstimatePublisher publisher_;
+  MapPublisher map_publisher_;
   DebugView debug_view_;
   ros::Publisher status_publisher_;
   Warnings warnings_;
@@ -99,6 +104,7 @@ class ScKfOdometryNode {
   PoseKeeper pose_keeper_;
   InputGate gate_;
   ImuInput imu_;
+  PoseUpdateInput pose_updates_;
   std::deque<Scan> scans_without_mount_;
   std::string mount_problem_;  // of the newest scan that waits for its mount
   bool paused_ = false;
