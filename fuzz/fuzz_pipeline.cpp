@@ -71,6 +71,16 @@ struct Robot {
   }
 };
 
+/// What only one method has.
+void switchOthersOn(PipelineOptions& options, Bytes& bytes) {
+  const bool can = options.method == "sckf_multi";
+  options.calibration.on = can && bytes.chance();
+  options.imu.gyro = can && bytes.chance();
+  options.imu.orientation = can && bytes.chance();
+  options.pose_updates.on = can && bytes.chance();
+  options.standstill.time = can ? 0.2 * bytes.upTo(2) : 0.0;
+}
+
 PipelineOptions options(Bytes& bytes) {
   PipelineOptions options;
   options.method = fusionMethodNames()[static_cast<std::size_t>(bytes.upTo(5))];
@@ -84,6 +94,7 @@ PipelineOptions options(Bytes& bytes) {
   options.deskew = bytes.chance();
   options.odometry_noise.model = odometryModelNames()[static_cast<std::size_t>(bytes.upTo(2))];
   options.scan.max_beams = bytes.chance() ? 60 : 400;
+  switchOthersOn(options, bytes);
   return options;
 }
 
@@ -109,6 +120,11 @@ void requireSound(const Estimate& estimate) {
   requireCovariance(estimate.twist.covariance, "the twist");
 }
 
+void requireSound(const MapEstimate& estimate) {
+  require(estimate.map_from_base.vector().allFinite() && estimate.map_from_odom.vector().allFinite(), "pose in map");
+  requireCovariance(estimate.covariance, "the pose in map");
+}
+
 class Driver {
  public:
   explicit Driver(Bytes bytes) : bytes_(bytes), pipeline_(options(bytes_)) {}
@@ -122,7 +138,7 @@ class Driver {
 
  private:
   void call() {
-    switch (bytes_.upTo(9)) {
+    switch (bytes_.upTo(11)) {
       case 0:
         return pause();
       case 1:
@@ -134,8 +150,12 @@ class Driver {
       case 4:
         return setOptions();
       case 5:
+        return addImu();
       case 6:
+        return addPose();
       case 7:
+      case 8:
+      case 9:
         return addScan(scan());
       default:
         return drive();
@@ -193,6 +213,34 @@ class Driver {
     Eigen::Matrix3d A;
     std::generate(A.data(), A.data() + A.size(), [&] { return bytes_.number(size); });
     return bytes_.chance() ? Eigen::Matrix3d(A * A.transpose()) : A;
+  }
+
+  /// Readings of the last tenth of a second, and one of anything.
+  void addImu() {
+    const SE2 pose = robot_.pose();
+    for (int i = 9; i >= 0; --i) pipeline_.addImu({robot_.now - std::chrono::milliseconds(10 * i), 0.4, pose.yaw});
+    ImuSample spoilt{spoiltStamp(), bytes_.number(10.0), bytes_.number(10.0)};
+    if (bytes_.chance()) spoilt.yaw.reset();
+    if (bytes_.chance()) spoilt.yaw_rate.reset();
+    pipeline_.addImu(spoilt);
+  }
+
+  void addPose() {
+    PoseUpdate pose{robot_.now, {robot_.pose(), 0.01 * Eigen::Matrix3d::Identity()}};
+    switch (bytes_.upTo(3)) {
+      case 0:
+        pose.stamp = spoiltStamp();
+        break;
+      case 1:
+        pose.map_from_base.pose = SE2(bytes_.number(100.0), bytes_.number(100.0), bytes_.number(4.0));
+        break;
+      case 2:
+        pose.map_from_base.covariance = matrix(1.0);
+        break;
+      default:
+        break;
+    }
+    pipeline_.addPose(pose);
   }
 
   LaserScan scan() const {
@@ -259,6 +307,7 @@ class Driver {
   void setOptions() {
     PipelineOptions changed = options(bytes_);
     changed.method = pipeline_.options().method;
+    switchOthersOn(changed, bytes_);
     pipeline_.setOptions(changed);
   }
 
@@ -266,12 +315,19 @@ class Driver {
     for (const ScanReport& report : pipeline_.process()) {
       ++reported_;
       if (report.estimate) requireSound(*report.estimate);
+      if (report.in_map) requireSound(*report.in_map);
+      require(report.calibration.error.allFinite() && std::isfinite(report.gyro_bias.value), "states are finite");
       if (report.innovation) require(std::isfinite(report.innovation->nis()), "the NIS is finite");
       const bool used = report.outcome == ScanOutcome::kReference || wasUsed(report.outcome);
       require(used == report.reason.empty(), "a scan that is not used has a reason: " + report.reason);
       const bool is_skewed = report.deskewing == Deskewing::kNotTold || report.deskewing == Deskewing::kRefused;
       require(is_skewed == !report.deskewing_problem.empty(),
               "a scan that should be deskewed has a reason if it is not");
+    }
+    for (const PoseReport& report : pipeline_.takePoseReports()) {
+      if (report.in_map) requireSound(*report.in_map);
+      const bool used = report.outcome == PoseOutcome::kEntered || report.outcome == PoseOutcome::kUsed;
+      require(used == report.reason.empty(), "a pose that is not used has a reason: " + report.reason);
     }
     if (const auto latest = pipeline_.latest()) requireSound(*latest);
     require(scans_ == reported_ + pipeline_.waitingScans(), "every scan is in one report or waits");

@@ -90,7 +90,7 @@ double MultiCloneFilter::varianceOf(const std::optional<Part>& part) const {
 
 WheelCalibration MultiCloneFilter::calibration() const {
   if (!calibration_error_) return {};
-  return {calibration_, errors_.covariance(*calibration_error_)};
+  return {calibration_, symmetric(errors_.covariance(*calibration_error_))};
 }
 
 // ---- motion
@@ -171,7 +171,7 @@ OdometryIncrement MultiCloneFilter::refined(const OdometryIncrement& increment) 
   Matrix3d& Q = motion.covariance;
   if (calibration_error_ && increment.by_wheels) {
     const Matrix3d B = byCalibration(increment.before_from_after);
-    Q += B * errors_.covariance(*calibration_error_) * B.transpose();
+    Q += symmetric(B * errors_.covariance(*calibration_error_) * B.transpose());
   }
   for (const MotionMeasurement& z : increment.measured) {
     Innovation::Vector r = z.value - z.seen * motion.before_from_after.vector();

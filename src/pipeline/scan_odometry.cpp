@@ -302,6 +302,7 @@ void ScanOdometry::followAtADistance() {
   const bool holds_back = !waiting_.empty() && waiting_.endOfOldest() > waiting_.oldest();
   if (holds_back) too_old = std::min(too_old, waiting_.oldest());
   if (too_old <= filter_stamp_) return;
+  odometry_.discardBefore(filter_stamp_);  // for which a sample may have come just now
   const Stamp last = odometry_.lastUpTo(too_old);
   takePoses(last);
   if (last > filter_stamp_) propagateTo(last);
@@ -411,7 +412,7 @@ void ScanOdometry::followScans(Stamp since, const DisplacementPrediction& at_sin
   Eigen::Matrix3d A;
   Eigen::Matrix3d B;
   const SE2 motion = between(at_since.reference_from_current, now.reference_from_current, &A, &B);
-  twist_.add({motion, A * at_since.covariance * A.transpose() + B * now.covariance * B.transpose()},
+  twist_.add({motion, symmetric(A * at_since.covariance * A.transpose() + B * now.covariance * B.transpose())},
              seconds(report.stamp - since));
   if (wasUsed(report.outcome) && report.match.displacement->dimension() == 3) motion_known_ = report.stamp;
 }
