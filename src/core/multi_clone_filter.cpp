@@ -124,8 +124,7 @@ void MultiCloneFilter::propagate(const OdometryIncrement& increment) {
     measureMotion(increment, W);
   }
   if (calibrates) forgetCalibration(increment.before_from_after.translation().norm());
-  if (present_) errors_.removeRanges(*present_);
-  present_.reset();
+  beginScan();
 }
 
 /// The wheels' noise is a part of the state while others tell of the motion.
@@ -208,6 +207,11 @@ void MultiCloneFilter::age(double dt) {
 
 // ---- displacements
 
+void MultiCloneFilter::beginScan() {
+  if (present_) errors_.removeRanges(*present_);
+  present_.reset();
+}
+
 DisplacementPrediction MultiCloneFilter::predictedDisplacementFrom(std::size_t clone) const {
   Matrix3d J;
   const SE2 reference_from_current = between(clones_[clone].pose, pose_, nullptr, &J);  // (16)
@@ -252,10 +256,7 @@ void MultiCloneFilter::update(const Displacement& z, const Innovation& r) {
 void MultiCloneFilter::clone(const Eigen::VectorXd& range_variances) {
   const bool start_is_reference = clones_.size() == 1 && errors_.variances(clones_.front().ranges).size() == 0;
   if (start_is_reference) forget(0);  // which was no scan
-  if (present_ && errors_.variances(*present_).size() != range_variances.size()) {
-    errors_.removeRanges(*present_);
-    present_.reset();
-  }
+  if (present_ && errors_.variances(*present_).size() != range_variances.size()) beginScan();
   if (!present_) present_ = errors_.addRanges(range_variances);  // not used: independent of all poses
   clones_.insert(clones_.begin(), {pose_, errors_.addCloneOf(pose_error_), *present_});  // (24)-(27)
   present_.reset();

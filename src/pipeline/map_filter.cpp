@@ -30,6 +30,11 @@ void MapFilter::age(double dt) {
   if (map_) map_->age(dt);
 }
 
+void MapFilter::beginScan() {
+  odom_->beginScan();
+  if (map_) map_->beginScan();
+}
+
 void MapFilter::update(const Displacement& displacement, const Innovation& innovation) {
   odom_->update(displacement, innovation);
   if (map_) map_->update(displacement, map_->innovation(displacement));

@@ -6,20 +6,38 @@
 
 namespace sckf {
 
-void ReferenceScans::add(std::shared_ptr<const PreparedScan> scan, int kept, FusionMethod& filter) {
-  while (filter.clones() > static_cast<std::size_t>(kept)) filter.forget(filter.clones() - 1);
-  scans_.push_front(std::move(scan));
-  scans_.resize(filter.clones());
+std::vector<std::size_t> ReferenceScans::clonesOf(std::size_t laser) const {
+  std::vector<std::size_t> clones;
+  for (std::size_t clone = 0; clone < references_.size(); ++clone) {
+    if (references_[clone].laser == laser) clones.push_back(clone);
+  }
+  return clones;
 }
 
-std::vector<std::size_t> ReferenceScans::worthComparing(const FusionMethod& filter,
+std::optional<std::size_t> ReferenceScans::newestOf(std::size_t laser) const {
+  const std::vector<std::size_t> clones = clonesOf(laser);
+  return clones.empty() ? std::nullopt : std::optional(clones.front());
+}
+
+void ReferenceScans::add(std::shared_ptr<const PreparedScan> scan, std::size_t laser, int kept, FusionMethod& filter) {
+  references_.push_front({std::move(scan), laser});
+  if (references_.size() > filter.clones()) references_.resize(filter.clones());  // of a method that keeps only one
+  std::vector<std::size_t> clones = clonesOf(laser);
+  for (; clones.size() > static_cast<std::size_t>(kept); clones.pop_back()) {
+    filter.forget(clones.back());
+    references_.erase(references_.begin() + static_cast<std::ptrdiff_t>(clones.back()));
+  }
+}
+
+std::vector<std::size_t> ReferenceScans::worthComparing(std::size_t laser, const FusionMethod& filter,
                                                         const ReferenceOptions& options) const {
+  const std::vector<std::size_t> own = clonesOf(laser);
   std::vector<std::pair<double, std::size_t>> near;  // distance as a share of what is allowed
-  for (std::size_t clone = 1; clone < scans_.size(); ++clone) {
-    const SE2 displacement = filter.predictedDisplacementFrom(clone).reference_from_current;
+  for (std::size_t i = 1; i < own.size(); ++i) {
+    const SE2 displacement = filter.predictedDisplacementFrom(own[i]).reference_from_current;
     const double distance = std::hypot(displacement.translation().norm() / options.older_dist_linear,
                                        displacement.yaw / options.older_dist_angular);
-    if (distance < 1.0) near.emplace_back(clone == 1 ? 0.0 : distance, clone);
+    if (distance < 1.0) near.emplace_back(i == 1 ? 0.0 : distance, own[i]);
   }
   std::sort(near.begin(), near.end());
   std::vector<std::size_t> clones;
@@ -29,13 +47,12 @@ std::vector<std::size_t> ReferenceScans::worthComparing(const FusionMethod& filt
   return clones;
 }
 
-Eigen::Matrix3d referenceSlack(std::size_t clone, const ReferenceOptions& options) {
-  const double references = static_cast<double>(clone + 1);
-  return references *
-         Eigen::Vector3d(options.older_std_translation, options.older_std_translation, options.older_std_yaw)
-             .cwiseAbs2()
-             .asDiagonal()
-             .toDenseMatrix();
+Eigen::Matrix3d ReferenceScans::slack(std::size_t clone, const ReferenceOptions& options) const {
+  const auto is_of_laser = [&](const Reference& r) { return r.laser == references_[clone].laser; };
+  const auto end = references_.begin() + static_cast<std::ptrdiff_t>(clone) + 1;
+  const auto in_between = static_cast<double>(std::count_if(references_.begin(), end, is_of_laser));
+  const Eigen::Vector3d std(options.older_std_translation, options.older_std_translation, options.older_std_yaw);
+  return (in_between * std.cwiseAbs2()).asDiagonal();
 }
 
 }  // namespace sckf

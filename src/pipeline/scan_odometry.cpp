@@ -40,6 +40,12 @@ void checkStates(const PipelineOptions& options) {
   if (options.standstill.time > 0.0) refuse("standstill_time is " + std::to_string(options.standstill.time), "0");
 }
 
+void checkLasers(const PipelineOptions& options) {
+  if (options.lasers == 1 || (options.lasers > 1 && options.method == "sckf_multi")) return;
+  throw std::invalid_argument("there are " + std::to_string(options.lasers) + " lasers, and method is \"" +
+                              options.method + "\": expected one laser, or more and method \"sckf_multi\"");
+}
+
 void checkPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance) {
   constexpr double kLargest = 1e9;  // beyond, doubles tell centimetres no more
   const Eigen::Vector3d pose = odom_from_base.vector();
@@ -66,7 +72,7 @@ std::string describe(const Innovation& innovation, double bound) {
 ScanOdometry::ScanOdometry(const PipelineOptions& options, const SE2& odom_from_base, const Eigen::Matrix3d& covariance)
     : options_(options),
       matcher_(options.matcher),
-      reference_policy_(options.reference),
+      lasers_(options.lasers, {ReferencePolicy(options.reference), {}, std::nullopt}),
       odometry_(options.motion, options.odometry_timeout),
       imu_(options.imu.timeout),
       twist_(options.twist_window),
@@ -75,6 +81,7 @@ ScanOdometry::ScanOdometry(const PipelineOptions& options, const SE2& odom_from_
   checkMethod(options.method);
   checkStates(options);
   modelledIncrement(SE2(), options.odometry_noise);  // throws if there is no such model
+  checkLasers(options);
   checkPose(odom_from_base, covariance);
 }
 
@@ -93,18 +100,23 @@ OdometryBuffer::Insertion ScanOdometry::addOdometry(const OdometrySample& sample
   return insertion;
 }
 
-void ScanOdometry::addScan(LaserScan scan, const Eigen::Isometry3d& base_from_laser) {
+void ScanOdometry::addScan(LaserScan scan, const Eigen::Isometry3d& base_from_laser, std::size_t laser) {
+  if (laser >= lasers_.size()) {
+    throw std::out_of_range("a scan of laser " + std::to_string(laser) + ": expected one below " +
+                            std::to_string(lasers_.size()));
+  }
   if (!isTime(scan.stamp)) {
     std::ostringstream reason;
     reason << "its stamp is " << seconds(scan.stamp) << " s: expected a time between 1970 and 2106";
-    given_up_.push_back(notUsed(scan.stamp, ScanOutcome::kUnusable, reason.str()));
+    given_up_.push_back(notUsed(scan.stamp, laser, ScanOutcome::kUnusable, reason.str()));
     return;
   }
-  const Sweep sweep = options_.deskew ? sweeps_.check(scan) : Sweep();
-  waiting_.add(std::move(scan), base_from_laser, sweep);
+  const Sweep sweep = options_.deskew ? lasers_[laser].sweeps.check(scan) : Sweep();
+  waiting_.add(std::move(scan), base_from_laser, sweep, laser);
   while (waiting_.size() > static_cast<std::size_t>(options_.max_waiting_scans)) {
-    given_up_.push_back(
-        notUsed(waiting_.giveUp(), ScanOutcome::kNoOdometry, "too many scans wait for odometry at their stamps"));
+    const WaitingScans::Entry given_up = waiting_.giveUp();
+    given_up_.push_back(notUsed(given_up.scan.stamp, given_up.laser, ScanOutcome::kNoOdometry,
+                                "too many scans wait for odometry at their stamps"));
   }
 }
 
@@ -114,7 +126,7 @@ std::vector<ScanReport> ScanOdometry::process() {
   bool held_back = false;
   while (!waiting_.empty() && imuTells(waiting_.endOfOldest())) {
     const bool bracketed = filter_ && waiting_.endOfOldest() <= odometry_.newest();
-    if (!bracketed && !bridgeToOldestWaiting()) break;
+    if (olderMayCome() || (!bracketed && !bridgeToOldestWaiting())) break;
     held_back = held_back || waiting_.endOfOldest() > waiting_.oldest();
     takePoses(waiting_.oldest());
     reports.push_back(take(waiting_.takeOldest()));
@@ -124,14 +136,25 @@ std::vector<ScanReport> ScanOdometry::process() {
   return reports;
 }
 
+/// Lasers need their time for a scan, the slow ones more; their stamps are of its beginning.
+bool ScanOdometry::olderMayCome() const {
+  if (options_.lasers == 1 || waiting_.areOfAll(options_.lasers)) return false;
+  const Stamp now = odometry_.empty() ? waiting_.newest() : std::max(waiting_.newest(), odometry_.newest());
+  return now < waiting_.oldest() + toDuration(options_.scan_patience);
+}
+
 ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   const Clock::time_point begin = Clock::now();
   const Stamp stamp = waiting.scan.stamp;
-  if (!odometry_.covers(stamp)) return notUsed(stamp, ScanOutcome::kNoOdometry, "older than the odometry at hand");
-  if (stamp < filter_stamp_ || (!references_.empty() && stamp == filter_stamp_)) {
-    return notUsed(stamp, ScanOutcome::kOutOfOrder, "not newer than the estimate");
+  if (!odometry_.covers(stamp))
+    return notUsed(stamp, waiting.laser, ScanOutcome::kNoOdometry, "older than the odometry at hand");
+  Laser& laser = lasers_[waiting.laser];
+  if (stamp < filter_stamp_ || laser.taken == stamp) {
+    return notUsed(stamp, waiting.laser, ScanOutcome::kOutOfOrder, "not newer than the estimate");
   }
+  laser.taken = stamp;
   ScanReport report;
+  report.laser = waiting.laser;
   report.stamp = stamp;
   report.deskewing = waiting.sweep.deskewing;
   report.deskewing_problem = waiting.sweep.problem;
@@ -139,22 +162,23 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   std::optional<DisplacementPrediction> at_before;  // asked for where wheels do not tell the twist
   if (odometry_.endsBridged()) at_before = filter_->predictedDisplacement();
   propagateTo(stamp);  // (9)-(14)
+  filter_->beginScan();
   useHeading(report);  // (34)
   report.wheels_known = std::exchange(wheels_known_, true);
   report.scan =
       prepareScan(waiting.scan, waiting.base_from_laser, options_.scan, &report.reason, motionDuring(waiting));
   if (!report.scan) {
     report.outcome = ScanOutcome::kUnusable;
-  } else if (references_.empty()) {
-    report.new_reference = true;
+  } else if (const auto reference = references_.newestOf(waiting.laser)) {
+    compareWithReference(*reference, report);  // (16)-(23)
   } else {
-    compareWithReference(report);  // (16)-(23)
+    report.new_reference = true;
   }
   if (at_before) followScans(before, *at_before, report);
   if (report.new_reference) {
     compareWithOlderReferences(report);
     filter_->clone(report.scan->rangeVariances());  // (24)-(27)
-    references_.add(report.scan, options_.reference.kept, *filter_);
+    references_.add(report.scan, report.laser, options_.reference.kept, *filter_);
   }
   report.estimate = estimate();
   report.in_map = inMap();
@@ -169,20 +193,21 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   return report;
 }
 
-void ScanOdometry::compareWithReference(ScanReport& report) {
-  const PreparedScan& reference = references_.newest();
+void ScanOdometry::compareWithReference(std::size_t clone, ScanReport& report) {
+  const PreparedScan& reference = references_[clone];
   report.reference_stamp = reference.stamp;
-  report.prediction = filter_->predictedDisplacement();  // (16)
+  report.prediction = filter_->predictedDisplacementFrom(clone);  // (16)
   const Clock::time_point begin = Clock::now();
   report.match = matcher_.match(reference, *report.scan, report.prediction);  // (1)
   report.match_time = secondsSince(begin);
+  if (report.match.displacement) report.match.displacement->clone = clone;
   const bool used = report.match.displacement ? fuse(report) : false;  // (17)-(23)
   if (!report.match.displacement) {
     report.outcome = ScanOutcome::kNoMatch;
     report.reason = toString(report.match.failure);
   }
-  const SE2 reference_from_scan = filter_->predictedDisplacement().reference_from_current;
-  report.new_reference = reference_policy_.replaces(reference_from_scan, report.match.overlap, used);
+  const SE2 reference_from_scan = filter_->predictedDisplacementFrom(clone).reference_from_current;
+  report.new_reference = lasers_[report.laser].policy.replaces(reference_from_scan, report.match.overlap, used);
 }
 
 bool ScanOdometry::fuse(ScanReport& report) {
@@ -191,14 +216,16 @@ bool ScanOdometry::fuse(ScanReport& report) {
   report.innovation = filter_->innovation(displacement);
   report.nis_bound = bound;
   report.outcome = ScanOutcome::kUpdated;
-  if (report.innovation->nis() > bound && looksLikeSlip(report.match)) {
+  const Displacement::MatrixDD slack = slackAmongLasers(displacement);
+  const auto contradicts = [&] { return report.innovation->nis(slack) > bound; };
+  if (contradicts() && looksLikeSlip(report.match)) {
     const Eigen::Vector3d std(options_.gate.slip_std_translation, options_.gate.slip_std_translation,
                               options_.gate.slip_std_yaw);
     filter_->distrustWheels(std.cwiseAbs2().asDiagonal());
     report.innovation = filter_->innovation(displacement);
     if (report.wheels_known) report.outcome = ScanOutcome::kSlip;
   }
-  if (report.innovation->nis() > bound) {
+  if (contradicts()) {
     report.outcome = ScanOutcome::kGated;
     report.reason = describe(*report.innovation, bound);
     return false;
@@ -209,9 +236,9 @@ bool ScanOdometry::fuse(ScanReport& report) {
 
 void ScanOdometry::compareWithOlderReferences(ScanReport& report) {
   const ReferenceOptions& options = options_.reference;
-  for (const std::size_t clone : references_.worthComparing(*filter_, options)) {
+  for (const std::size_t clone : references_.worthComparing(report.laser, *filter_, options)) {
     DisplacementPrediction prediction = filter_->predictedDisplacementFrom(clone);
-    const Eigen::Matrix3d slack = referenceSlack(clone, options);
+    const Eigen::Matrix3d slack = references_.slack(clone, options);
     prediction.covariance += slack;
     Match match = matcher_.matchNear(references_[clone], *report.scan, prediction);
     if (!match.displacement || match.overlap < options.older_min_overlap) continue;
@@ -223,6 +250,13 @@ void ScanOdometry::compareWithOlderReferences(ScanReport& report) {
     filter_->update(displacement, innovation);
     ++report.older_references;
   }
+}
+
+/// Another laser may have corrected the estimate just now, by a displacement whose covariance has tails.
+Displacement::MatrixDD ScanOdometry::slackAmongLasers(const Displacement& displacement) const {
+  if (options_.lasers == 1) return Displacement::MatrixDD::Zero(displacement.dimension(), displacement.dimension());
+  const Eigen::Matrix3d slack = references_.slack(displacement.clone, options_.reference);
+  return displacement.observable * slack * displacement.observable.transpose();
 }
 
 double ScanOdometry::gate(const Displacement& displacement) const {
@@ -249,6 +283,10 @@ void ScanOdometry::setPose(const SE2& odom_from_base, const Eigen::Matrix3d& cov
 }
 
 void ScanOdometry::setOptions(const PipelineOptions& options) {
+  if (options.lasers != options_.lasers) {
+    throw std::invalid_argument("there are " + std::to_string(options.lasers) + " lasers: expected " +
+                                std::to_string(options_.lasers) + ", which only a new estimate can change");
+  }
   if (options.method != options_.method) {
     throw std::invalid_argument("method is \"" + options.method + "\": expected \"" + options_.method +
                                 "\", which only a new estimate can change");
@@ -257,7 +295,7 @@ void ScanOdometry::setOptions(const PipelineOptions& options) {
   checkStates(options);
   options_ = options;
   matcher_ = ScanMatcher(options.matcher);
-  reference_policy_.setOptions(options.reference);
+  for (Laser& laser : lasers_) laser.policy.setOptions(options.reference);
   odometry_.setLimits(options.motion, options.odometry_timeout);
   twist_.setDuration(options.twist_window);
 }
@@ -279,7 +317,10 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
   wheels_known_ = true;
   standstill_.interrupt();
   references_.clear();
-  reference_policy_ = ReferencePolicy(options_.reference);
+  for (Laser& laser : lasers_) {
+    laser.policy = ReferencePolicy(options_.reference);
+    laser.taken.reset();
+  }
   carried_on_.reset();
   carryOn();
 }

@@ -38,9 +38,10 @@ std::string toString(HeadingUse use) {
 
 bool wasUsed(ScanOutcome outcome) { return outcome == ScanOutcome::kUpdated || outcome == ScanOutcome::kSlip; }
 
-ScanReport notUsed(Stamp stamp, ScanOutcome outcome, const std::string& reason) {
+ScanReport notUsed(Stamp stamp, std::size_t laser, ScanOutcome outcome, const std::string& reason) {
   ScanReport report;
   report.stamp = stamp;
+  report.laser = laser;
   report.outcome = outcome;
   report.reason = reason;
   return report;

@@ -1,6 +1,7 @@
 #include "sckf_odometry/pipeline/waiting_scans.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 namespace sckf {
@@ -11,14 +12,21 @@ bool later(Stamp stamp, const WaitingScans::Entry& entry) { return stamp < entry
 
 }  // namespace
 
-void WaitingScans::add(LaserScan scan, const Eigen::Isometry3d& base_from_laser, const Sweep& sweep) {
+void WaitingScans::add(LaserScan scan, const Eigen::Isometry3d& base_from_laser, const Sweep& sweep,
+                       std::size_t laser) {
   const auto place = std::upper_bound(scans_.begin(), scans_.end(), scan.stamp, later);
-  scans_.insert(place, Entry{std::move(scan), base_from_laser, sweep, arrivals_++});
+  scans_.insert(place, Entry{std::move(scan), base_from_laser, sweep, laser, arrivals_++});
 }
 
 std::size_t WaitingScans::countAfter(Stamp stamp) const {
   return static_cast<std::size_t>(
       std::distance(std::upper_bound(scans_.begin(), scans_.end(), stamp, later), scans_.end()));
+}
+
+bool WaitingScans::areOfAll(std::size_t lasers) const {
+  std::set<std::size_t> waiting;
+  for (const Entry& entry : scans_) waiting.insert(entry.laser);
+  return waiting.size() >= lasers;
 }
 
 WaitingScans::Entry WaitingScans::takeOldest() {
@@ -27,12 +35,12 @@ WaitingScans::Entry WaitingScans::takeOldest() {
   return entry;
 }
 
-Stamp WaitingScans::giveUp() {
+WaitingScans::Entry WaitingScans::giveUp() {
   const auto arrived_earlier = [](const Entry& a, const Entry& b) { return a.arrival < b.arrival; };
   const auto longest = std::min_element(scans_.begin(), scans_.end(), arrived_earlier);
-  const Stamp stamp = longest->scan.stamp;
+  Entry entry = std::move(*longest);
   scans_.erase(longest);
-  return stamp;
+  return entry;
 }
 
 }  // namespace sckf

@@ -42,6 +42,23 @@ std::string silenceOf(const std::string& what, double silence, const std::string
 
 }  // namespace
 
+Health::Health(const std::string& odometry_source, const std::vector<std::string>& scan_topics)
+    : odometry_source_(odometry_source) {
+  for (const std::string& topic : scan_topics) lasers_.push_back({topic, {}});
+}
+
+void Health::scanCame(std::size_t laser, const ros::Time& stamp, const ros::Time& now) {
+  scans.came(stamp, now);
+  lasers_[laser].came.came(stamp, now);
+}
+
+std::string Health::topicNotHeard() const {
+  for (const Laser& laser : lasers_) {
+    if (laser.came.received() == 0) return laser.topic;
+  }
+  return "";
+}
+
 void Health::scanTaken(const ScanReport& report) {
   if (scans_in_pipeline_ > 0) --scans_in_pipeline_;
   const bool is_failed_match = report.outcome == ScanOutcome::kNoMatch;
@@ -127,10 +144,13 @@ std::vector<Health::Finding> Health::findings(const Conditions& conditions, cons
   }
   if (!conditions.waiting_for.empty()) warn("waiting", "waiting for " + conditions.waiting_for);
   const double scan_timeout = options.node.scan_timeout;
-  const double scan_silence = scans.silence(now).value_or(0.0);
-  if (scan_silence > scan_timeout) {
-    warn("scan timeout", silenceOf("scans on " + scan_topic_, scan_silence, "scan_timeout", scan_timeout) +
-                             ": the wheels carry on alone");
+  const bool all_silent = scans.silence(now).value_or(0.0) > scan_timeout;
+  for (const Laser& laser : lasers_) {
+    const double silence = laser.came.silence(now).value_or(0.0);
+    if (silence <= scan_timeout) continue;
+    warn("scan timeout " + laser.topic,
+         silenceOf("scans on " + laser.topic, silence, "scan_timeout", scan_timeout) +
+             (all_silent ? ": the wheels carry on alone" : ": wheels and other lasers carry on"));
   }
   if (unused_in_a_row_ >= kManyUnused) {
     warn("scans unused", "the last " + std::to_string(unused_in_a_row_) +

@@ -24,38 +24,39 @@ std::string turnedRound(const sensor_msgs::LaserScan& scan) {
 
 }  // namespace
 
-InputGate::InputGate(const NodeOptions& options, const std::string& odometry_source, const std::string& scan_topic,
-                     Health& health, Warnings& warnings)
+InputGate::InputGate(const NodeOptions& options, const std::string& odometry_source,
+                     const std::vector<std::string>& scan_topics, Health& health, Warnings& warnings)
     : odometry_source_(odometry_source),
-      scan_topic_(scan_topic),
+      scan_topics_(scan_topics),
       health_(health),
       warnings_(warnings),
       odometry_stamps_(options.time_jump),
-      scan_stamps_(options.time_jump) {}
+      scan_stamps_(scan_topics.size(), StampGuard<Scan>(options.time_jump)) {}
 
-InputGate::Scans InputGate::admit(const sensor_msgs::LaserScan::ConstPtr& message) {
+InputGate::Scans InputGate::admit(const sensor_msgs::LaserScan::ConstPtr& message, std::size_t laser) {
   const std::string problem = isTurnedRound(*message) ? turnedRound(*message) : "";
-  return admit({message->header, message}, "angles turned round", problem);
+  return admit({message->header, message}, laser, "angles turned round", problem);
 }
 
-InputGate::Scans InputGate::admit(const sensor_msgs::PointCloud2::ConstPtr& message) {
-  return admit({message->header, message}, "bad cloud", cloudProblem(*message));
+InputGate::Scans InputGate::admit(const sensor_msgs::PointCloud2::ConstPtr& message, std::size_t laser) {
+  return admit({message->header, message}, laser, "bad cloud", cloudProblem(*message));
 }
 
-InputGate::Scans InputGate::admit(const Scan& message, const std::string& kind, const std::string& problem) {
+InputGate::Scans InputGate::admit(const Scan& message, std::size_t laser, const std::string& kind,
+                                  const std::string& problem) {
   const std_msgs::Header& header = message.header;
-  health_.scans.came(header.stamp, ros::Time::now());
+  health_.scanCame(laser, header.stamp, ros::Time::now());
   if (header.stamp.isZero()) {
-    refuseScan("no stamp", "header.stamp is 0: the time of the first beam expected");
+    refuseScan(laser, "no stamp", "header.stamp is 0: the time of the first beam expected");
   } else if (header.frame_id.empty()) {
-    refuseScan("no frame", "header.frame_id is empty: the laser's frame expected");
+    refuseScan(laser, "no frame", "header.frame_id is empty: the laser's frame expected");
   } else if (!problem.empty()) {
-    refuseScan(kind, problem);
+    refuseScan(laser, kind, problem);
   } else {
     const Stamp stamp = toStamp(header.stamp);
-    const Scans admission = scan_stamps_.admit(stamp, message, now(), odometry_stamps_.newest());
+    const Scans admission = scan_stamps_[laser].admit(stamp, message, now(), odometry_stamps_.newest());
     health_.scans.ended(kWrongStamp, admission.dropped);
-    if (admission.passed.empty()) warnOfHeldBack("scan on " + scan_topic_, stamp);
+    if (admission.passed.empty()) warnOfHeldBack("scan on " + scan_topics_[laser], stamp);
     return admission;
   }
   return {};
@@ -98,9 +99,9 @@ InputGate::Samples InputGate::admitByStamp(const OdometrySample& sample) {
   return admission;
 }
 
-void InputGate::refuseScan(const std::string& kind, const std::string& reason) {
+void InputGate::refuseScan(std::size_t laser, const std::string& kind, const std::string& reason) {
   health_.scans.ended("refused, " + kind);
-  warnings_.warn("scan " + kind, "scan on " + scan_topic_ + " not used: " + reason);
+  warnings_.warn("scan " + kind, "scan on " + scan_topics_[laser] + " not used: " + reason);
 }
 
 void InputGate::refuseOdometry(const std::string& kind, const std::string& reason) {
@@ -109,17 +110,26 @@ void InputGate::refuseOdometry(const std::string& kind, const std::string& reaso
 }
 
 void InputGate::restart() {
-  if (odometry_stamps_.newest() > scan_stamps_.newest()) {
-    odometry_stamps_.restart();
-  } else {
-    scan_stamps_.restart();
-  }
+  if (odometry_stamps_.newest() > newestScan()) return odometry_stamps_.restart();
+  for (StampGuard<Scan>& stamps : scan_stamps_) stamps.restart();
+}
+
+Stamp InputGate::newestScan() const {
+  Stamp newest{0};
+  for (const StampGuard<Scan>& stamps : scan_stamps_) newest = std::max(newest, stamps.newest());
+  return newest;
+}
+
+std::size_t InputGate::scansHeldBack() const {
+  std::size_t held_back = 0;
+  for (const StampGuard<Scan>& stamps : scan_stamps_) held_back += stamps.heldBack();
+  return held_back;
 }
 
 void InputGate::warnOfHeldBack(const std::string& what, Stamp stamp) {
   std::ostringstream text;
   text << what << " held back: header.stamp is " << toTime(stamp) << ": one about that of the newest, "
-       << toTime(std::max(odometry_stamps_.newest(), scan_stamps_.newest()))
+       << toTime(std::max(odometry_stamps_.newest(), newestScan()))
        << ", expected; more that go on from it are a jump of time";
   warnings_.warn(what + " held back", text.str());
 }

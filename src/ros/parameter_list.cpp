@@ -35,6 +35,7 @@ List atRunTime(List list) {
 
 List nodeParameters(NodeOptions& node) {
   return {
+      {"scan_topics", &node.scan_topics, {}, "", {}},
       text("odom_frame", node.odom_frame),
       text("base_frame", node.base_frame),
       flag("publish_tf", node.publish_tf),
@@ -140,6 +141,7 @@ List estimationParameters(PipelineOptions& pipeline) {
       number("slip_std_yaw", gate.slip_std_yaw, within(0.0, 100.0), "rad"),
       number("slip_min_overlap", gate.slip_min_overlap, within(0.0, 1.0)),
       number("slip_max_residual", gate.slip_max_residual, aboveUpTo(0.0, 1000.0)),
+      number("scan_patience", pipeline.scan_patience, within(0.0, 60.0), "s"),
       number("max_scan_delay", pipeline.max_scan_delay, aboveUpTo(0.0, 1e6), "s"),
       number("max_waiting_scans", pipeline.max_waiting_scans, within(1, 100000), "scans"),
   };

@@ -18,6 +18,26 @@ std::string joined(const std::string& group, const std::string& name) {
   return group.empty() ? name : group + "/" + name;
 }
 
+/// As a user would write it.
+std::string shown(const ParameterValue::Texts& texts) {
+  std::string all;
+  for (const std::string& text : texts) all += (all.empty() ? "" : ", ") + text;
+  return "[" + all + "]";
+}
+
+ParameterValue list(XmlRpc::XmlRpcValue& node) {
+  ParameterValue::Texts texts;
+  for (int i = 0; i < node.size(); ++i) {
+    if (node[i].getType() != XmlRpc::XmlRpcValue::TypeString) {
+      std::ostringstream text;
+      node.write(text);
+      return {ParameterValue::Other(), text.str()};
+    }
+    texts.push_back(static_cast<std::string&>(node[i]));
+  }
+  return {texts, shown(texts)};
+}
+
 void collect(const std::string& name, XmlRpc::XmlRpcValue& node, Values& values) {
   std::ostringstream text;
   node.write(text);
@@ -43,8 +63,11 @@ void collect(const std::string& name, XmlRpc::XmlRpcValue& node, Values& values)
       values[name] = {value, "\"" + value + "\""};
       break;
     }
+    case XmlRpc::XmlRpcValue::TypeArray:
+      values[name] = list(node);
+      break;
     default:
-      values[name] = {ParameterValue::List(), text.str()};
+      values[name] = {ParameterValue::Other(), text.str()};
   }
 }
 
@@ -65,13 +88,23 @@ ParameterValue scalar(const YAML::Node& node) {
   return {text, "\"" + text + "\""};
 }
 
+ParameterValue list(const YAML::Node& node) {
+  ParameterValue::Texts texts;
+  for (const YAML::Node& entry : node) {
+    const ParameterValue value = entry.IsScalar() ? scalar(entry) : ParameterValue();
+    if (!std::holds_alternative<std::string>(value.value)) return {ParameterValue::Other(), YAML::Dump(node)};
+    texts.push_back(entry.Scalar());
+  }
+  return {texts, shown(texts)};
+}
+
 void collect(const std::string& name, const YAML::Node& node, Values& values) {
   if (node.IsMap()) {
     for (const auto& entry : node) collect(joined(name, entry.first.as<std::string>()), entry.second, values);
   } else if (node.IsScalar()) {
     values[name] = scalar(node);
   } else {
-    values[name] = {ParameterValue::List(), YAML::Dump(node)};
+    values[name] = list(node);
   }
 }
 

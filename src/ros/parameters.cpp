@@ -5,6 +5,7 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -15,8 +16,11 @@ namespace sckf {
 
 namespace {
 
+bool isList(const Parameter& parameter) { return std::holds_alternative<std::vector<std::string>*>(parameter.field); }
+
 bool isNumber(const Parameter& parameter) {
-  return !std::holds_alternative<bool*>(parameter.field) && !std::holds_alternative<std::string*>(parameter.field);
+  return !std::holds_alternative<bool*>(parameter.field) && !std::holds_alternative<std::string*>(parameter.field) &&
+         !isList(parameter);
 }
 
 bool isWhole(const Parameter& parameter) {
@@ -25,6 +29,7 @@ bool isWhole(const Parameter& parameter) {
 
 std::string expectation(const Parameter& parameter) {
   if (std::holds_alternative<bool*>(parameter.field)) return "true or false";
+  if (isList(parameter)) return "a list of texts, of which none is empty and none comes twice,";
   if (!isNumber(parameter)) {
     if (parameter.choices.empty()) return parameter.may_be_empty ? "a text" : "a text that is not empty";
     std::string text = "one of";
@@ -60,6 +65,14 @@ bool assign(const Parameter& parameter, const ParameterValue& value) {
     if (!choices.empty() && std::find(choices.begin(), choices.end(), *text) == choices.end()) return false;
     **field = *text;
     return true;
+  }
+  if (const auto* field = std::get_if<std::vector<std::string>*>(&parameter.field)) {
+    const auto* texts = std::get_if<ParameterValue::Texts>(&value.value);
+    const bool sensible = texts != nullptr && !texts->empty() &&
+                          std::find(texts->begin(), texts->end(), "") == texts->end() &&
+                          std::set<std::string>(texts->begin(), texts->end()).size() == texts->size();
+    if (sensible) **field = *texts;
+    return sensible;
   }
   if (isWhole(parameter) && !std::holds_alternative<int>(value.value)) return false;
   const std::optional<double> real = number(value);
@@ -124,6 +137,11 @@ void checkTogether(const Options& options, std::vector<std::string>& problems) {
   ordered("cloud_height_min", node.cloud_input.height_min, "cloud_height_max", node.cloud_input.height_max);
   ordered("cloud_range_min", node.cloud_input.range_min, "cloud_range_max", node.cloud_input.range_max);
   ordered("range_noise_min", scan.range_noise_min, "range_noise_max", scan.range_noise_max);
+  if (node.scan_topics.size() > 1 && options.pipeline.method != "sckf_multi") {
+    problems.push_back("scan_topics has " + std::to_string(node.scan_topics.size()) +
+                       " topics: one expected with method \"" + options.pipeline.method +
+                       "\", more only with \"sckf_multi\"");
+  }
   if (node.odom_frame == node.base_frame) {
     problems.push_back("odom_frame = \"" + node.odom_frame + "\": another frame than base_frame expected");
   }
@@ -137,6 +155,11 @@ void checkTogether(const Options& options, std::vector<std::string>& problems) {
 }
 
 }  // namespace
+
+std::vector<std::string> rangeTopics(const NodeOptions& options) {
+  const bool is_default = options.scan_topics == NodeOptions().scan_topics;
+  return options.use_cloud_input && is_default ? std::vector<std::string>{"cloud_in"} : options.scan_topics;
+}
 
 bool Range::contains(double value) const {
   if (!std::isfinite(value)) return false;
@@ -176,6 +199,7 @@ Options readOptions(const ParameterSource& source, std::vector<std::string>* war
   NodeOptions& node = options.node;
   for (std::string* frame : {&node.odom_frame, &node.base_frame, &node.map_frame, &node.tf_odometry_frame})
     *frame = frameName(*frame);
+  options.pipeline.lasers = node.scan_topics.size();
   checkTogether(options, problems);
   if (problems.empty()) return options;
   std::string text = "bad parameters:";

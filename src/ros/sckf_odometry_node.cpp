@@ -30,6 +30,11 @@ NodeOptions withOdometryOnTf(NodeOptions options) {
   return options;
 }
 
+std::vector<std::string> resolved(const ros::NodeHandle& nh, std::vector<std::string> topics) {
+  for (std::string& topic : topics) topic = nh.resolveName(topic);
+  return topics;
+}
+
 Options readOptions(const ros::NodeHandle& private_nh) {
   std::vector<std::string> warnings;
   Options options = readOptions(ParameterServer(private_nh), &warnings);
@@ -44,7 +49,7 @@ Options readOptions(const ros::NodeHandle& private_nh) {
 
 ScKfOdometryNode::ScKfOdometryNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     : options_(readOptions(private_nh)),
-      scan_topic_(nh.resolveName(options_.node.use_cloud_input ? "cloud_in" : "scan")),
+      scan_topics_(resolved(nh, rangeTopics(options_.node))),
       odometry_source_(options_.node.use_tf_odometry ? "TF" : nh.resolveName("odom")),
       pipeline_(std::make_unique<ScanOdometry>(options_.pipeline)),
       tf_(options_.node.base_frame, options_.node.use_tf_odometry ? options_.node.tf_odometry_frame : "",
@@ -53,9 +58,9 @@ ScKfOdometryNode::ScKfOdometryNode(ros::NodeHandle nh, const ros::NodeHandle& pr
       map_publisher_(nh, options_),
       debug_view_(nh, options_.node),
       status_publisher_(nh.advertise<sckf_odometry::Status>("status", kQueue)),
-      health_(odometry_source_, scan_topic_),
+      health_(odometry_source_, scan_topics_),
       pose_keeper_(options_.node),
-      gate_(options_.node, odometry_source_, scan_topic_, health_, warnings_),
+      gate_(options_.node, odometry_source_, scan_topics_, health_, warnings_),
       imu_(options_.pipeline.imu, nh.resolveName("imu"), options_.node.time_jump, health_, warnings_),
       pose_updates_(options_.node, nh.resolveName("pose_update"), health_, warnings_),
       diagnostics_(nh, private_nh, private_nh.getNamespace()),
@@ -93,9 +98,18 @@ void ScKfOdometryNode::subscribe(ros::NodeHandle& nh) {
   if (options_.pipeline.pose_updates.on) {
     subscribers_.push_back(nh.subscribe("pose_update", queue, &ScKfOdometryNode::onPoseUpdate, this, hints));
   }
-  subscribers_.push_back(options_.node.use_cloud_input
-                             ? nh.subscribe("cloud_in", queue, &ScKfOdometryNode::onCloud, this, hints)
-                             : nh.subscribe("scan", queue, &ScKfOdometryNode::onScan, this, hints));
+  for (std::size_t laser = 0; laser < scan_topics_.size(); ++laser) {
+    using ScanPtr = sensor_msgs::LaserScan::ConstPtr;
+    using CloudPtr = sensor_msgs::PointCloud2::ConstPtr;
+    const boost::function<void(const ScanPtr&)> on_scan = [this, laser](const ScanPtr& scan) { onScan(laser, scan); };
+    const boost::function<void(const CloudPtr&)> on_cloud = [this, laser](const CloudPtr& cloud) {
+      onCloud(laser, cloud);
+    };
+    const std::string& topic = scan_topics_[laser];
+    subscribers_.push_back(options_.node.use_cloud_input
+                               ? nh.subscribe<sensor_msgs::PointCloud2>(topic, queue, on_cloud, {}, hints)
+                               : nh.subscribe<sensor_msgs::LaserScan>(topic, queue, on_scan, {}, hints));
+  }
 }
 
 void ScKfOdometryNode::startTimers(ros::NodeHandle& nh) {
@@ -135,12 +149,12 @@ void ScKfOdometryNode::guarded(const Callback& callback) {
   }
 }
 
-void ScKfOdometryNode::onScan(const sensor_msgs::LaserScan::ConstPtr& message) {
-  guarded([&] { addScans(gate_.admit(message)); });
+void ScKfOdometryNode::onScan(std::size_t laser, const sensor_msgs::LaserScan::ConstPtr& message) {
+  guarded([&] { addScans(laser, gate_.admit(message, laser)); });
 }
 
-void ScKfOdometryNode::onCloud(const sensor_msgs::PointCloud2::ConstPtr& message) {
-  guarded([&] { addScans(gate_.admit(message)); });
+void ScKfOdometryNode::onCloud(std::size_t laser, const sensor_msgs::PointCloud2::ConstPtr& message) {
+  guarded([&] { addScans(laser, gate_.admit(message, laser)); });
 }
 
 void ScKfOdometryNode::onOdometry(const nav_msgs::Odometry::ConstPtr& message) {
@@ -193,10 +207,10 @@ void ScKfOdometryNode::setViewRate() {
   view_timer_.start();
 }
 
-void ScKfOdometryNode::addScans(const InputGate::Scans& admission) {
+void ScKfOdometryNode::addScans(std::size_t laser, const InputGate::Scans& admission) {
   // Without odometry it is the scans that tell the time.
   if (admission.time_jump < Stamp(0) && pipeline_->onScansAlone()) followTime(admission.time_jump);
-  for (const Scan& scan : admission.passed) scans_without_mount_.push_back(scan);
+  for (const Scan& scan : admission.passed) scans_without_mount_.push_back({laser, scan});
   advance();
 }
 
@@ -239,30 +253,33 @@ void ScKfOdometryNode::advance() {
 }
 
 void ScKfOdometryNode::passScansWithMount() {
-  std::deque<Scan> waiting;
-  for (const Scan& message : scans_without_mount_) {
+  std::deque<ScanWithoutMount> waiting;
+  for (const auto& [laser, message] : scans_without_mount_) {
     if (paused_) {
       health_.scans.ended("paused");
     } else if (const auto base_from_sensor = tf_.baseFrom(frameName(message.header.frame_id), &mount_problem_)) {
       const MountedScan mounted = toMountedScan(message, *base_from_sensor, options_.node.cloud_input);
-      pipeline_->addScan(mounted.scan, mounted.base_from_laser);
+      pipeline_->addScan(mounted.scan, mounted.base_from_laser, laser);
       health_.scanPassed();
     } else {
-      waiting.push_back(message);
+      waiting.push_back({laser, message});
     }
   }
   scans_without_mount_ = std::move(waiting);
   if (scans_without_mount_.size() <= static_cast<std::size_t>(options_.pipeline.max_waiting_scans)) return;
-  gate_.refuseScan("no mount", "its mount is not known: " + mount_problem_);
+  gate_.refuseScan(scans_without_mount_.front().laser, "no mount", "its mount is not known: " + mount_problem_);
   scans_without_mount_.pop_front();
 }
 
 void ScKfOdometryNode::account(const ScanReport& report) {
   health_.scanTaken(report);
-  status_publisher_.publish(toStatus(report, options_.pipeline.method, options_.node.odom_frame, ros::Time::now()));
+  auto status = toStatus(report, options_.pipeline.method, options_.node.odom_frame, ros::Time::now());
+  status.scan_topic = scan_topics_[report.laser];
+  status_publisher_.publish(status);
   if (!report.reason.empty()) {
     const std::string outcome = toString(report.outcome);
-    warnings_.warn("scan " + outcome, "scan on " + scan_topic_ + " not used: " + outcome + ": " + report.reason);
+    warnings_.warn("scan " + outcome,
+                   "scan on " + scan_topics_[report.laser] + " not used: " + outcome + ": " + report.reason);
   }
   warnOfSkew(report);
   debug_view_.show(report);
@@ -281,7 +298,8 @@ void ScKfOdometryNode::accountPoses(bool scans_were_taken) {
 }
 
 void ScKfOdometryNode::warnOfSkew(const ScanReport& report) {
-  const std::string text = "scan on " + scan_topic_ + " used as it is, not deskewed: " + report.deskewing_problem;
+  const std::string text =
+      "scan on " + scan_topics_[report.laser] + " used as it is, not deskewed: " + report.deskewing_problem;
   if (report.deskewing == Deskewing::kNotTold) warnings_.warnOnce("scan " + toString(report.deskewing), text);
   if (report.deskewing == Deskewing::kRefused) warnings_.warn("scan " + toString(report.deskewing), text);
 }
@@ -364,7 +382,8 @@ std::string ScKfOdometryNode::waitingFor() const {
   }
   if (health_.odometry.received() == 0) return "odometry on " + odometry_source_;
   if (!scans_without_mount_.empty()) return "the mount of the laser: " + mount_problem_;
-  if (health_.scans.received() == 0) return "scans on " + scan_topic_;
+  const std::string silent = health_.topicNotHeard();
+  if (!silent.empty()) return "scans on " + silent;
   if (options_.pipeline.imu.isUsed() && health_.imu.received() == 0) return "the IMU on " + imu_.topic();
   if (options_.pipeline.pose_updates.on && health_.pose_updates.received() == 0) {
     return "absolute poses on " + pose_updates_.topic();

@@ -11,6 +11,8 @@
 #include <iostream>
 #include <map>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include "sckf_odometry/pipeline/scan_odometry.h"
 #include "sckf_odometry/ros/cloud_message.h"
@@ -30,7 +32,7 @@ struct Arguments {
   std::string csv;
   std::string params;
   std::string method;
-  std::string scan_topic;  // empty: the default of its kind
+  std::vector<std::string> scan_topics;
   std::string odom_topic = "/odom";
   std::string imu_topic = "/imu";
   std::string pose_update_topic = "/pose_update";
@@ -167,8 +169,9 @@ class Replay {
             Stamp(std::chrono::seconds(1))),
         trajectory_(arguments.trajectory),
         map_trajectory_(arguments.map_trajectory),
-        csv_(arguments.csv) {
-    if (arguments_.scan_topic.empty()) arguments_.scan_topic = takesClouds() ? "/cloud_in" : "/scan";
+        csv_(arguments.csv),
+        scan_topics_(rangeTopics(options.node)) {
+    for (std::string& topic : scan_topics_) topic = topic.front() == '/' ? topic : "/" + topic;
     if (csv_) writeCsvHeader(csv_);
   }
 
@@ -179,8 +182,10 @@ class Replay {
     } catch (const rosbag::BagException& exception) {
       throw std::runtime_error(arguments_.bag + ": " + exception.what());
     }
-    rosbag::View view(bag, rosbag::TopicQuery({"/tf", "/tf_static", arguments_.scan_topic, arguments_.odom_topic,
-                                               arguments_.imu_topic, arguments_.pose_update_topic}));
+    std::vector<std::string> topics{"/tf", "/tf_static", arguments_.odom_topic, arguments_.imu_topic,
+                                    arguments_.pose_update_topic};
+    topics.insert(topics.end(), scan_topics_.begin(), scan_topics_.end());
+    rosbag::View view(bag, rosbag::TopicQuery(topics));
     const auto begin = std::chrono::steady_clock::now();
     ProgressBar progress(view.size());
     for (const rosbag::MessageInstance& message : view) {
@@ -190,11 +195,11 @@ class Replay {
     progress.finish();
     if (scans_ == 0) {
       throw std::runtime_error(arguments_.bag + ": no sensor_msgs/" + (takesClouds() ? "PointCloud2" : "LaserScan") +
-                               " on " + arguments_.scan_topic + "; see --scan-topic");
+                               " on " + scan_topics_.front() + "; see --scan-topic");
     }
     if (!waiting_.empty()) {
       std::fprintf(stderr, "%zu scans not used: no transform %s -> %s: %s\n", waiting_.size(),
-                   options_.node.base_frame.c_str(), frameName(waiting_.back().header.frame_id).c_str(),
+                   options_.node.base_frame.c_str(), frameName(waiting_.back().message.header.frame_id).c_str(),
                    mount_problem_.c_str());
     }
     trajectory_.finish();
@@ -218,20 +223,24 @@ class Replay {
     } else if (const auto pose = message.instantiate<geometry_msgs::PoseWithCovarianceStamped>()) {
       addPose(*pose);
     } else if (const auto cloud = message.instantiate<sensor_msgs::PointCloud2>(); cloud && takesClouds()) {
-      addCloud(cloud);
+      addCloud(laserOf(message.getTopic()), cloud);
     } else if (const auto scan = message.instantiate<sensor_msgs::LaserScan>(); scan && !takesClouds()) {
       ++scans_;
-      waiting_.push_back({scan->header, scan});
+      waiting_.push_back({laserOf(message.getTopic()), {scan->header, scan}});
     }
     passScansWithMount();
     process();
   }
 
-  void addCloud(const sensor_msgs::PointCloud2::ConstPtr& cloud) {
+  std::size_t laserOf(const std::string& topic) const {
+    return static_cast<std::size_t>(std::find(scan_topics_.begin(), scan_topics_.end(), topic) - scan_topics_.begin());
+  }
+
+  void addCloud(std::size_t laser, const sensor_msgs::PointCloud2::ConstPtr& cloud) {
     ++scans_;
     const std::string problem = cloudProblem(*cloud);
     if (problem.empty()) {
-      waiting_.push_back({cloud->header, cloud});
+      waiting_.push_back({laser, {cloud->header, cloud}});
     } else {
       std::fprintf(stderr, "cloud at %.9f not used: %s\n", cloud->header.stamp.toSec(), problem.c_str());
     }
@@ -273,10 +282,11 @@ class Replay {
 
   void passScansWithMount() {
     while (!waiting_.empty()) {
-      const auto mount = tf_.baseFrom(frameName(waiting_.front().header.frame_id), &mount_problem_);
+      const auto& [laser, message] = waiting_.front();
+      const auto mount = tf_.baseFrom(frameName(message.header.frame_id), &mount_problem_);
       if (!mount) return;
-      const MountedScan mounted = toMountedScan(waiting_.front(), *mount, options_.node.cloud_input);
-      pipeline_.addScan(mounted.scan, mounted.base_from_laser);
+      const MountedScan mounted = toMountedScan(message, *mount, options_.node.cloud_input);
+      pipeline_.addScan(mounted.scan, mounted.base_from_laser, laser);
       waiting_.pop_front();
     }
   }
@@ -306,7 +316,12 @@ class Replay {
   OutputFile map_trajectory_;
   OutputFile csv_;
   Statistics statistics_;
-  std::deque<RangeMessage> waiting_;  // for their mount
+  struct Waiting {
+    std::size_t laser;
+    RangeMessage message;
+  };
+  std::vector<std::string> scan_topics_;  // of each laser
+  std::deque<Waiting> waiting_;           // for their mount
   std::string mount_problem_;
   std::size_t scans_ = 0;
 };
@@ -323,7 +338,8 @@ std::optional<Arguments> parse(int argc, char** argv) {
      "write what became of each scan; the innovation is along the directions that the scans see, in m")
     ("params", po::value(&arguments.params), "parameter file, as config/sckf_odometry.yaml")
     ("method", po::value(&arguments.method), "instead of the parameter file's method")
-    ("scan-topic", po::value(&arguments.scan_topic), "(=/scan, or /cloud_in with the parameter use_cloud_input)")
+    ("scan-topic", po::value(&arguments.scan_topics),
+     "instead of the parameter file's scan_topics; again for each further laser")
     ("odom-topic", po::value(&arguments.odom_topic)->default_value(arguments.odom_topic), "")
     ("map-trajectory", po::value(&arguments.map_trajectory), "write the poses in map at the scans, in the format of TUM")
     ("pose-update-topic", po::value(&arguments.pose_update_topic)->default_value(arguments.pose_update_topic),
@@ -356,6 +372,8 @@ Options optionsFor(const Arguments& arguments) {
     for (const std::string& name : unknown) std::cerr << arguments.params << ": there is no parameter " << name << "\n";
   }
   if (!arguments.method.empty()) options.pipeline.method = arguments.method;
+  if (!arguments.scan_topics.empty()) options.node.scan_topics = arguments.scan_topics;
+  options.pipeline.lasers = options.node.scan_topics.size();
   return options;
 }
 

@@ -7,6 +7,7 @@ says what was measured, beside the bounds and beside the wheels alone: run with 
 """
 from __future__ import annotations
 
+import copy
 import os
 import subprocess
 import sys
@@ -14,9 +15,10 @@ import tempfile
 import unittest
 from dataclasses import dataclass
 from pathlib import Path
-from typing import List, Optional
+from typing import List, Optional, Sequence
 
 import numpy as np
+import rosbag
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "scripts"))
@@ -66,6 +68,22 @@ def recorded(name: str) -> Path:
     return bag
 
 
+def halved(bag: Path, output: Path) -> None:
+    """The log with each scan as those of two lasers: /right/scan and /left/scan."""
+    with rosbag.Bag(str(bag)) as source, rosbag.Bag(str(output), "w") as out:
+        for topic, message, stamp in source.read_messages():
+            if topic != "/scan":
+                out.write(topic, message, stamp)
+                continue
+            middle = len(message.ranges) // 2
+            for side, part in ("/right/scan", slice(0, middle)), ("/left/scan", slice(middle, None)):
+                half = copy.copy(message)
+                half.ranges, half.intensities = message.ranges[part], []
+                half.angle_min = message.angle_min + (part.start or 0) * message.angle_increment
+                half.angle_max = half.angle_min + (len(half.ranges) - 1) * message.angle_increment
+                out.write(side, half, stamp)
+
+
 def installed(path: Path) -> Path:
     if not path.is_file():
         raise unittest.SkipTest(f"{path} is missing: it comes with Debian's mrpt-common")
@@ -92,9 +110,10 @@ class DriftTest(unittest.TestCase):
     def path(self, name: str) -> Path:
         return Path(self.folder.name) / name
 
-    def replayed(self, bag: Path, method: Optional[str] = None) -> Trajectory:
+    def replayed(self, bag: Path, method: Optional[str] = None, scans: Sequence[str] = ("/scan",)) -> Trajectory:
         output = self.path("trajectory.tum")
-        run("replay", bag, "--trajectory", output, *(["--method", method] if method else []))
+        topics = [argument for topic in scans for argument in ("--scan-topic", topic)]
+        run("replay", bag, "--trajectory", output, *topics, *(["--method", method] if method else []))
         return read_tum(output)
 
     def drifted(self, bag: Path, reference: Trajectory, method: Optional[str] = None) -> Figures:
@@ -120,6 +139,20 @@ class DriftTest(unittest.TestCase):
 
     def test_intel(self) -> None:
         self.check_recorded("intel", 0.95, 0.083)
+
+    def test_two_lasers_that_see_half_each(self) -> None:
+        bag = recorded("intel")
+        halves = self.path("halves.bag")
+        halved(bag, halves)
+        reference = read_tum(bag.with_suffix(".tum"))
+        both = drift(reference, self.replayed(halves, scans=("/right/scan", "/left/scan")))
+        right = drift(reference, self.replayed(halves, scans=("/right/scan",)))
+        self.assertGreaterEqual(both.covered, COVERAGE * both.reference_poses)
+        print(f"\nintel, a laser for each half: {both.translation_percent:.2f} %, {both.rotation_deg_per_m:.3f} °/m; the "
+              f"right one alone: {right.translation_percent:.2f} %, {right.rotation_deg_per_m:.3f} °/m")
+        self.assertLess(both.translation_percent, 1.6)
+        self.assertLess(both.rotation_deg_per_m, 0.13)
+        self.assertLess(both.translation_percent, 0.75 * right.translation_percent)
 
     def test_intel_raw(self) -> None:
         self.check_recorded("intel-raw", 1.3, 0.09)

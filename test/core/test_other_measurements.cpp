@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <deque>
 #include <limits>
@@ -10,6 +9,7 @@
 #include <tuple>
 #include <vector>
 
+#include "chi_squared_band.h"
 #include "matrix_matchers.h"
 #include "room_simulation.h"
 #include "sckf_odometry/core/multi_clone_filter.h"
@@ -249,13 +249,8 @@ Statistics simulate(const Sensors& sensors) {
   return sums;
 }
 
-/// Where the mean over the runs of a χ² with d degrees of freedom lies, but for once in a thousand times.
 void expectInBand(const std::vector<double>& means, int d, const std::string& what) {
-  const boost::math::chi_squared sum(static_cast<double>(kRuns * d));
-  for (std::size_t scan = 10; scan <= kScans; scan += 10) {
-    EXPECT_GT(means[scan], boost::math::quantile(sum, 0.0005) / kRuns) << what << " at scan " << scan << ": too large";
-    EXPECT_LT(means[scan], boost::math::quantile(sum, 0.9995) / kRuns) << what << " at scan " << scan << ": too small";
-  }
+  expectInBand(means, ChiSquaredBand(d, kRuns), what);
 }
 
 TEST(OtherMeasurements, SystematicErrorsOfTheWheelsAreFound) {

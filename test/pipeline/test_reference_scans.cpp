@@ -18,10 +18,10 @@ const Eigen::Matrix3d kSmall = 1e-6 * Eigen::Matrix3d::Identity();
 struct Way {
   explicit Way(FusionMethod& f, int kept = 16) : filter(f), kept(kept) {}
 
-  void add(const SE2& step) {
+  void add(const SE2& step, std::size_t laser = 0) {
     filter.propagate({step, kSmall});
     filter.clone(Eigen::VectorXd::Constant(1, 1e-4));
-    scans.add(std::make_shared<PreparedScan>(), kept, filter);
+    scans.add(std::make_shared<PreparedScan>(), laser, kept, filter);
   }
 
   FusionMethod& filter;
@@ -42,18 +42,19 @@ TEST(ReferenceScans, TheOneBeforeComesFirstThenTheNearest) {
   Way way(filter);
   for (int i = 0; i < 6; ++i) way.add(SE2(1.0, 0.0, 0.0));  // at 1 … 6
   filter.propagate({SE2(-3.8, 0.0, 0.0), kSmall});          // back to 2.2: clones 0 … 5 are at 6 … 1
-  EXPECT_THAT(way.scans.worthComparing(filter, limits(3)), ElementsAre(1U, 4U, 3U)) << "5 is 2.8 m away, then 2 and 3";
-  EXPECT_THAT(way.scans.worthComparing(filter, limits(1)), ElementsAre(1U));
-  EXPECT_THAT(way.scans.worthComparing(filter, limits(0)), IsEmpty());
+  EXPECT_THAT(way.scans.worthComparing(0, filter, limits(3)), ElementsAre(1U, 4U, 3U))
+      << "5 is 2.8 m away, then 2 and 3";
+  EXPECT_THAT(way.scans.worthComparing(0, filter, limits(1)), ElementsAre(1U));
+  EXPECT_THAT(way.scans.worthComparing(0, filter, limits(0)), IsEmpty());
 }
 
 TEST(ReferenceScans, WhatIsFarOrTurnedIsNotCompared) {
   MultiCloneFilter filter(SE2(), kSmall);
   Way way(filter);
   for (int i = 0; i < 3; ++i) way.add(SE2(2.0, 0.0, 0.0));
-  EXPECT_THAT(way.scans.worthComparing(filter, limits(9)), ElementsAre(1U)) << "the other is 4 m away";
+  EXPECT_THAT(way.scans.worthComparing(0, filter, limits(9)), ElementsAre(1U)) << "the other is 4 m away";
   filter.propagate({SE2(0.0, 0.0, 1.6), kSmall});
-  EXPECT_THAT(way.scans.worthComparing(filter, limits(9)), IsEmpty()) << "turned by more than 1.5 rad";
+  EXPECT_THAT(way.scans.worthComparing(0, filter, limits(9)), IsEmpty()) << "turned by more than 1.5 rad";
 }
 
 TEST(ReferenceScans, ForgetsTheOldest) {
@@ -64,14 +65,33 @@ TEST(ReferenceScans, ForgetsTheOldest) {
     EXPECT_EQ(filter.clones(), static_cast<std::size_t>(std::min(i + 1, 3)));
   }
   EXPECT_NEAR(filter.clonedPose(2).x, 0.8, 1e-9);
-  EXPECT_THAT(way.scans.worthComparing(filter, limits(9)), ElementsAre(1U, 2U));
+  EXPECT_THAT(way.scans.worthComparing(0, filter, limits(9)), ElementsAre(1U, 2U));
 }
 
 TEST(ReferenceScans, AMethodWithOneCloneHasNoOlderOnes) {
   StochasticCloningFilter filter(SE2(), kSmall);
   Way way(filter);
   for (int i = 0; i < 5; ++i) way.add(SE2(0.1, 0.0, 0.0));
-  EXPECT_THAT(way.scans.worthComparing(filter, limits(9)), IsEmpty());
+  EXPECT_THAT(way.scans.worthComparing(0, filter, limits(9)), IsEmpty());
+}
+
+TEST(ReferenceScans, LasersHaveTheirOwn) {
+  MultiCloneFilter filter(SE2(), kSmall);
+  Way way(filter, 3);
+  EXPECT_FALSE(way.scans.newestOf(0));
+  for (int i = 0; i < 8; ++i) {  // clones, the newest first: of the lasers 0 0 0 1 0 0 0 1, of which six are kept
+    way.add(SE2(0.1, 0.0, 0.0), i % 4 == 0 ? 1 : 0);
+  }
+  EXPECT_EQ(filter.clones(), 5U) << "three of the first laser, two of the second";
+  EXPECT_EQ(way.scans.newestOf(0), 0U);
+  EXPECT_EQ(way.scans.newestOf(1), 3U);
+  EXPECT_FALSE(way.scans.newestOf(2));
+  EXPECT_NEAR(filter.clonedPose(3).x, 0.5, 1e-9);
+  EXPECT_NEAR(filter.clonedPose(4).x, 0.1, 1e-9) << "that of the second laser outlives older ones of the first";
+  EXPECT_THAT(way.scans.worthComparing(0, filter, limits(9)), ElementsAre(1U, 2U));
+  EXPECT_THAT(way.scans.worthComparing(1, filter, limits(9)), ElementsAre(4U));
+  ReferenceOptions options;
+  EXPECT_TRUE(matricesNear(way.scans.slack(4, options), way.scans.slack(1, options), 1e-15)) << "each the second";
 }
 
 TEST(ReferenceScans, SlackGrowsWithTheReferencesInBetween) {
@@ -79,7 +99,10 @@ TEST(ReferenceScans, SlackGrowsWithTheReferencesInBetween) {
   options.older_std_translation = 0.03;
   options.older_std_yaw = 0.01;
   const Eigen::Vector3d variances(4 * 9e-4, 4 * 9e-4, 4 * 1e-4);
-  EXPECT_TRUE(matricesNear(referenceSlack(3, options), Eigen::Matrix3d(variances.asDiagonal()), 1e-12));
+  MultiCloneFilter filter(SE2(), kSmall);
+  Way way(filter);
+  for (int i = 0; i < 4; ++i) way.add(SE2(0.1, 0.0, 0.0));
+  EXPECT_TRUE(matricesNear(way.scans.slack(3, options), Eigen::Matrix3d(variances.asDiagonal()), 1e-12));
 }
 
 /// Round after round in one room: what one reference after the other adds up to, older ones take back.

@@ -37,8 +37,8 @@ TEST(WaitingScans, CountsThoseAfterAnInstant) {
 /// A scan from the future would else stay for ever, and in its place good ones were given up.
 TEST(WaitingScans, GivesUpTheOneThatHasWaitedLongest) {
   WaitingScans scans = waiting({90000, 10, 20});
-  EXPECT_EQ(scans.giveUp(), ms(90000));
-  EXPECT_EQ(scans.giveUp(), ms(10));
+  EXPECT_EQ(scans.giveUp().scan.stamp, ms(90000));
+  EXPECT_EQ(scans.giveUp().scan.stamp, ms(10));
   EXPECT_EQ(scans.size(), 1U);
   EXPECT_EQ(scans.oldest(), ms(20));
 }

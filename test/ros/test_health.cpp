@@ -24,7 +24,7 @@ class HealthTest : public testing::Test {
  protected:
   HealthTest() {
     health_.odometry.came(at(100.0), at(100.0));
-    health_.scans.came(at(100.0), at(100.0));
+    health_.scanCame(0, at(100.0), at(100.0));
   }
 
   struct Verdict {
@@ -45,13 +45,29 @@ class HealthTest : public testing::Test {
     return "missing";
   }
 
-  Health health_{"/odom", "/scan"};
+  Health health_{"/odom", {"/scan"}};
   Health::Conditions conditions_;
   Options options_;
   diagnostic_updater::DiagnosticStatusWrapper status_;
 };
 
 TEST_F(HealthTest, AllIsWellWhileMessagesCome) { EXPECT_EQ(verdictAt(100.9).level, Level::OK); }
+
+TEST_F(HealthTest, ALaserThatIsSilentIsNamedAndTheOthersAreSaidToCarryOn) {
+  health_ = Health("/odom", {"/front", "/rear"});
+  EXPECT_EQ(health_.topicNotHeard(), "/front");
+  health_.scanCame(0, at(100.0), at(100.0));
+  EXPECT_EQ(health_.topicNotHeard(), "/rear");
+  health_.scanCame(1, at(100.0), at(100.0));
+  EXPECT_EQ(health_.topicNotHeard(), "");
+  health_.scanCame(0, at(103.0), at(103.0));
+  Verdict verdict = verdictAt(103.0);
+  EXPECT_EQ(verdict.level, Level::WARN);
+  EXPECT_EQ(verdict.text, "no scans on /rear for 3 s (~scan_timeout: 2 s): wheels and other lasers carry on");
+  verdict = verdictAt(106.0);
+  EXPECT_TRUE(contains(verdict.text, "no scans on /front for 3 s (~scan_timeout: 2 s): the wheels carry on alone"));
+  EXPECT_TRUE(contains(verdict.text, "no scans on /rear for 6 s"));
+}
 
 TEST_F(HealthTest, WheelsThatAreSilentAreAnErrorThatSaysWhatHappens) {
   Verdict verdict = verdictAt(101.5);
@@ -78,9 +94,9 @@ TEST_F(HealthTest, AllThatIsWrongIsSaidUnderTheWorstLevel) {
 }
 
 TEST_F(HealthTest, MessagesBeforeThereIsATimeAreNoSilence) {
-  Health health("/odom", "/scan");
+  Health health("/odom", {"/scan"});
   health.odometry.came(at(1000.0), ros::Time());
-  health.scans.came(at(1000.0), ros::Time());
+  health.scanCame(0, at(1000.0), ros::Time());
   health.report(conditions_, options_, at(1000.0), status_);
   EXPECT_EQ(status_.message, "estimating");
 }
@@ -128,7 +144,7 @@ TEST_F(HealthTest, ManyScansInARowThatDidNotHelpAreAWarning) {
 }
 
 TEST_F(HealthTest, EveryScanIsAccountedFor) {
-  for (int i = 0; i < 6; ++i) health_.scans.came(at(100.0), at(100.0));  // with the first: 7
+  for (int i = 0; i < 6; ++i) health_.scanCame(0, at(100.0), at(100.0));  // with the first: 7
   health_.scans.ended("refused, no stamp");
   for (int i = 0; i < 4; ++i) health_.scanPassed();
   health_.scanTaken(scan(ScanOutcome::kReference, 100.1));

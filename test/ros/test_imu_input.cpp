@@ -63,7 +63,7 @@ class ImuInputTest : public testing::Test {
 
   ImuOptions options_;
   Warnings warnings_;
-  Health health_{"/odom", "/scan"};
+  Health health_{"/odom", {"/scan"}};
   TfInput tf_{"base_link", "", std::chrono::seconds(1)};
   std::unique_ptr<ImuInput> input_;
 };

@@ -56,10 +56,10 @@ class InputGateTest : public testing::Test {
     return gate_.admit(message, uses_twist_covariance, tf_).passed.size();
   }
 
-  Health health_{"/odom", "/scan"};
+  Health health_{"/odom", {"/scan"}};
   Warnings warnings_;
   TfInput tf_{"base_link", "", std::chrono::seconds(1)};
-  InputGate gate_{NodeOptions(), "/odom", "/scan", health_, warnings_};
+  InputGate gate_{NodeOptions(), "/odom", {"/scan"}, health_, warnings_};
 };
 
 TEST_F(InputGateTest, WhatIsAsItShouldBePassesAndHasNotEnded) {
@@ -138,6 +138,19 @@ TEST_F(InputGateTest, AWrongStampIsHeldBackAndCountedWhenTheNextGoesOn) {
   EXPECT_EQ(gate_.scansHeldBack(), 1u);
   EXPECT_EQ(admit(scanAt(1000.1)), 1u);
   EXPECT_THAT(health_.scans.ends(), ElementsAre(Pair("refused, wrong stamp", 1u)));
+}
+
+TEST_F(InputGateTest, LasersHaveTimesOfTheirOwn) {
+  Health health("/odom", {"/front", "/rear"});
+  InputGate gate(NodeOptions(), "/odom", {"/front", "/rear"}, health, warnings_);
+  const auto admitted = [&](std::size_t laser, double time) {
+    return gate.admit(boost::make_shared<sensor_msgs::LaserScan>(scanAt(time)), laser).passed.size();
+  };
+  EXPECT_EQ(admitted(0, 1000.0), 1u);
+  EXPECT_EQ(admitted(1, 990.0), 1u) << "the first of a slow one";
+  EXPECT_EQ(admitted(0, 900.0), 0u);
+  EXPECT_EQ(gate.scansHeldBack(), 1u);
+  EXPECT_EQ(admitted(1, 990.5), 1u) << "whatever the other says";
 }
 
 TEST_F(InputGateTest, ScansAheadOfTheClockPassIfOdometryIsThereToo) {

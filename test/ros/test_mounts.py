@@ -15,7 +15,7 @@ MOUNTS = {
     'ahead': Mount(x=0.4, y=0.0, frame='laser_ahead'),
     'rotated': Mount(x=-0.1, y=0.2, yaw=1.5708, frame='laser_rotated'),
     'upside_down': Mount(x=0.1, y=-0.1, yaw=-0.4, upside_down=True, frame='laser_upside_down'),
-    'tilted': Mount(x=0.2, z=5.0, yaw=0.3, pitch=0.4, frame='laser_tilted'),  # 8 % longer ranges ahead and behind
+    'tilted': Mount(x=0.2, z=5.0, yaw=0.3, pitch=0.3, frame='laser_tilted'),  # 5 % longer ranges ahead and behind
 }
 
 
@@ -33,6 +33,8 @@ class Mounts(unittest.TestCase):
                 if topic != '/odom' or name == 'ahead':  # odometry is that of the one robot
                     messages.append((topic, message, stamp))
         messages.sort(key=lambda entry: entry[2])
+        for recorder in cls.recorders.values():
+            recorder.wait_for_connection()
         cls.scans = len([topic for topic, _, _ in messages if topic == '/ahead/scan'])
         helpers.Feeder(sorted({topic for topic, _, _ in messages})).feed(messages)
         for name, recorder in cls.recorders.items():

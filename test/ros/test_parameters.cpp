@@ -41,9 +41,9 @@ std::string refusal(const std::string& yaml) {
 }
 
 /// The value that a parameter's field has.
-std::variant<bool, int, std::size_t, double, std::string> valueOf(const Parameter& parameter) {
-  return std::visit([](auto* field) { return std::variant<bool, int, std::size_t, double, std::string>(*field); },
-                    parameter.field);
+using Value = std::variant<bool, int, std::size_t, double, std::string, std::vector<std::string>>;
+Value valueOf(const Parameter& parameter) {
+  return std::visit([](auto* field) { return Value(*field); }, parameter.field);
 }
 
 TEST(Parameters, AnEmptyFileLeavesTheDefaults) {
@@ -101,6 +101,20 @@ TEST(Parameters, EachKindOfValueReachesItsField) {
   EXPECT_EQ(options.pipeline.matcher.max_iterations, 7);
   EXPECT_EQ(options.pipeline.max_waiting_scans, 3);
   EXPECT_EQ(options.pipeline.method, "sckf_nc");
+}
+
+TEST(Parameters, LasersAreAListOfTopics) {
+  const Options options = read("scan_topics: [front, 'rear/scan']\n");
+  EXPECT_EQ(options.node.scan_topics, (std::vector<std::string>{"front", "rear/scan"}));
+  EXPECT_EQ(options.pipeline.lasers, 2U);
+  for (const char* bad : {"scan_topics: scan", "scan_topics: []", "scan_topics: [scan, '']", "scan_topics: [scan, 3]",
+                          "scan_topics: [scan, scan]", "scan_topics: [[scan]]", "scan_topics: 7"}) {
+    EXPECT_TRUE(contains(refusal(bad), "a list of texts, of which none is empty and none comes twice, expected"))
+        << bad;
+  }
+  EXPECT_TRUE(contains(refusal("odom_frame: [a, b]"), "odom_frame = [a, b]: a text that is not empty expected"));
+  EXPECT_TRUE(contains(refusal("{scan_topics: [a, b], method: sckf}"),
+                       "scan_topics has 2 topics: one expected with method \"sckf\""));
 }
 
 TEST(Parameters, ANumberThatYamlTakesForATextIsANumber) {

@@ -26,7 +26,7 @@ class PoseUpdateInputTest : public testing::Test {
   }
 
   Warnings warnings_;
-  Health health_{"/odom", "/scan"};
+  Health health_{"/odom", {"/scan"}};
   PoseUpdateInput input_{NodeOptions(), "/pose_update", health_, warnings_};
 };
 

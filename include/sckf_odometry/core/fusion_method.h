@@ -80,6 +80,10 @@ class FusionMethod {
   /// The wheels slipped: what they said since the last update may be wrong by this covariance (in base_link) more.
   virtual void distrustWheels(const Eigen::Matrix3d& covariance) { propagate({SE2(), covariance}); }
 
+  /// Another scan is at hand, perhaps of the same instant: the range noise of the one before is done with, unless that
+  /// has become a reference. propagate() says the same.
+  virtual void beginScan() {}
+
   virtual DisplacementPrediction predictedDisplacement() const = 0;  ///< from the newest clone
 
   /// Residual, its covariance and the gain that update() would use: for gating. The displacement must see at least

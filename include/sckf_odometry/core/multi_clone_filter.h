@@ -32,6 +32,7 @@ class MultiCloneFilter : public FusionMethod {
   void propagate(const OdometryIncrement& increment) override;
   OdometryIncrement refined(const OdometryIncrement& increment) const override;
 
+  void beginScan() override;
   std::size_t clones() const override { return clones_.size(); }
   DisplacementPrediction predictedDisplacement() const override { return predictedDisplacementFrom(0); }
   DisplacementPrediction predictedDisplacementFrom(std::size_t clone) const override;

@@ -47,6 +47,7 @@ class MapFilter : public FusionMethod {
 
   void propagate(const OdometryIncrement& increment) override;
   void age(double dt) override;
+  void beginScan() override;
   void update(const Displacement& displacement, const Innovation& innovation) override;
   double updateHeading(double yaw, double variance, double nis_bound) override;
   void clone(const Eigen::VectorXd& range_variances) override;

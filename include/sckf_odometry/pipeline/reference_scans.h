@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "sckf_odometry/core/fusion_method.h"
@@ -12,27 +13,38 @@
 
 namespace sckf {
 
-/// The scan of each clone of the filter, in the order of the clones: the newest first.
+/// The scan of each clone of the filter, in the order of the clones: the newest first. Scans are compared with those of
+/// the same laser; lasers have numbers.
 class ReferenceScans {
  public:
-  bool empty() const { return scans_.empty(); }
-  const PreparedScan& newest() const { return *scans_.front(); }
-  const PreparedScan& operator[](std::size_t clone) const { return *scans_[clone]; }
+  bool empty() const { return references_.empty(); }
+  const PreparedScan& operator[](std::size_t clone) const { return *references_[clone].scan; }
 
-  /// The scan of the clone that the filter has just made; more than `kept` are forgotten, the oldest first.
-  void add(std::shared_ptr<const PreparedScan> scan, int kept, FusionMethod& filter);
-  void clear() { scans_.clear(); }
+  /// The clone of the newest reference of a laser; empty if it has none.
+  std::optional<std::size_t> newestOf(std::size_t laser) const;
 
-  /// The clones beside the newest that a scan at the filter's pose is worth comparing with, the most telling first: the
-  /// one before the newest, which sees most of what the scan sees, then the nearest, at which the robot may have been
-  /// long ago.
-  std::vector<std::size_t> worthComparing(const FusionMethod& filter, const ReferenceOptions& options) const;
+  /// The scan of the clone that the filter has just made; more than `kept` of a laser are forgotten, the oldest first.
+  void add(std::shared_ptr<const PreparedScan> scan, std::size_t laser, int kept, FusionMethod& filter);
+  void clear() { references_.clear(); }
+
+  /// The clones beside the newest that a scan of that laser at the filter's pose is worth comparing with, the most
+  /// telling first: the one before the newest, which sees most of what the scan sees, then the nearest, at which the
+  /// robot may have been long ago.
+  std::vector<std::size_t> worthComparing(std::size_t laser, const FusionMethod& filter,
+                                          const ReferenceOptions& options) const;
+
+  /// What the filter's covariance does not tell of a displacement from a clone, 3 × 3.
+  Eigen::Matrix3d slack(std::size_t clone, const ReferenceOptions& options) const;
 
  private:
-  std::deque<std::shared_ptr<const PreparedScan>> scans_;
-};
+  struct Reference {
+    std::shared_ptr<const PreparedScan> scan;
+    std::size_t laser;
+  };
 
-/// What the filter's covariance does not tell of a displacement from a clone, 3 × 3.
-Eigen::Matrix3d referenceSlack(std::size_t clone, const ReferenceOptions& options);
+  std::vector<std::size_t> clonesOf(std::size_t laser) const;
+
+  std::deque<Reference> references_;
+};
 
 }  // namespace sckf

@@ -52,6 +52,8 @@ struct PipelineOptions {
   int max_waiting_scans = 50;     ///< scans that wait for odometry; beyond, the one that has waited longest is given up
   double odometry_timeout = 1.0;  ///< [s] wheels whose newest odometry is older than scans by more are silent
   bool scans_alone = false;       ///< silent wheels: the scans carry on alone; false: the estimate waits
+  std::size_t lasers = 1;         ///< how many there are; more than one by sckf_multi only
+  double scan_patience = 0.25;    ///< [s] of several lasers: a scan waits so long for older ones of the others
 };
 
 class ScanOdometry {
@@ -72,10 +74,11 @@ class ScanOdometry {
   ImuBuffer::Insertion addImu(const ImuSample& sample) { return imu_.insert(sample); }
 
   /// The scan waits until odometry brackets its stamp, or until the wheels are silent and scans may carry on alone; for
-  /// an IMU that is not silent it waits, too. With options.deskew it waits for the end of its sweep, unless the scan's
-  /// time_increment cannot be: then it is used as it is. Scans come from one laser. base_from_laser: the mount at the
-  /// time of the scan.
-  void addScan(LaserScan scan, const Eigen::Isometry3d& base_from_laser);
+  /// an IMU that is not silent it waits, too; with options.deskew for the end of its sweep, unless its time_increment
+  /// cannot be: then it is used as it is; with several lasers until none of the others' can be older, or has taken too
+  /// long to come. base_from_laser: the mount at the time of the scan. laser: below options.lasers, or
+  /// std::out_of_range is thrown; each has references of its own.
+  void addScan(LaserScan scan, const Eigen::Isometry3d& base_from_laser, std::size_t laser = 0);
 
   /// An absolute pose corrects the estimate in map, and never the one in odom. It waits for the scans that are older,
   /// but no longer than they may be late, and for odometry at its stamp; one whose time is past by no more than scans
@@ -113,9 +116,10 @@ class ScanOdometry {
  private:
   void begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp);
   ScanReport take(const WaitingScans::Entry& waiting);
-  void compareWithReference(ScanReport& report);
+  void compareWithReference(std::size_t clone, ScanReport& report);
   bool fuse(ScanReport& report);
   void compareWithOlderReferences(ScanReport& report);
+  Displacement::MatrixDD slackAmongLasers(const Displacement& displacement) const;
   double gate(const Displacement& displacement) const;  ///< a larger innovation, normalised and squared, contradicts
   bool looksLikeSlip(const Match& match) const;
   ScanMotion motionDuring(const WaitingScans::Entry& waiting) const;
@@ -133,6 +137,7 @@ class ScanOdometry {
 
   bool wheelsAreSilent() const;
   bool bridgeToOldestWaiting();
+  bool olderMayCome() const;
   void followWheels(Stamp since);
   void followScans(Stamp since, const DisplacementPrediction& at_since, const ScanReport& report);
   MotionGuess guess() const;
@@ -143,11 +148,15 @@ class ScanOdometry {
 
   PipelineOptions options_;
   ScanMatcher matcher_;
-  ReferencePolicy reference_policy_;
+  struct Laser {
+    ReferencePolicy policy;
+    SweepCheck sweeps;
+    std::optional<Stamp> taken;  ///< of the last scan of this estimate
+  };
+  std::vector<Laser> lasers_;
   OdometryBuffer odometry_;
   ImuBuffer imu_;
   TwistWindow twist_;
-  SweepCheck sweeps_;
   WaitingScans waiting_;
   WaitingPoses waiting_poses_;
   std::vector<PoseReport> pose_reports_;

@@ -46,6 +46,7 @@ std::string toString(HeadingUse use);
 
 struct ScanReport {
   Stamp stamp{0};
+  std::size_t laser = 0;
   ScanOutcome outcome = ScanOutcome::kReference;
   std::string reason;                        ///< in words, where the scan did not correct the estimate
   std::optional<Estimate> estimate;          ///< at the scan's stamp; empty if out of order or without odometry
@@ -71,6 +72,6 @@ struct ScanReport {
 };
 
 /// Of a scan that is not used.
-ScanReport notUsed(Stamp stamp, ScanOutcome outcome, const std::string& reason);
+ScanReport notUsed(Stamp stamp, std::size_t laser, ScanOutcome outcome, const std::string& reason);
 
 }  // namespace sckf

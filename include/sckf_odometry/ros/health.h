@@ -35,13 +35,17 @@ class Health {
     std::string text;
   };
 
-  Health(const std::string& odometry_source, const std::string& scan_topic)
-      : odometry_source_(odometry_source), scan_topic_(scan_topic) {}
+  /// scan_topics: one for each laser.
+  Health(const std::string& odometry_source, const std::vector<std::string>& scan_topics);
 
   MessageTally odometry;
-  MessageTally scans;
+  MessageTally scans;         ///< of all lasers
   MessageTally imu;           ///< if it is used
   MessageTally pose_updates;  ///< if they are used
+
+  void scanCame(std::size_t laser, const ros::Time& stamp, const ros::Time& now);
+  /// The topic of a laser of which no scan has come; empty if there is none.
+  std::string topicNotHeard() const;
 
   /// The scan went to the pipeline, and will be reported, unless the pipeline is dropped before.
   void scanPassed() { ++scans_in_pipeline_; }
@@ -69,7 +73,11 @@ class Health {
   void addCalibration(diagnostic_updater::DiagnosticStatusWrapper& status) const;
 
   std::string odometry_source_;
-  std::string scan_topic_;
+  struct Laser {
+    std::string topic;
+    MessageTally came;
+  };
+  std::vector<Laser> lasers_;
   std::size_t scans_in_pipeline_ = 0;
   std::size_t poses_in_pipeline_ = 0;
   std::size_t poses_contradicting_ = 0;  // in a row

@@ -4,6 +4,7 @@
 #include <nav_msgs/Odometry.h>
 
 #include <string>
+#include <vector>
 
 #include "sckf_odometry/ros/health.h"
 #include "sckf_odometry/ros/parameters.h"
@@ -20,13 +21,14 @@ class InputGate {
   using Scans = StampGuard<Scan>::Admission;
   using Samples = StampGuard<OdometrySample>::Admission;
 
-  /// odometry_source: a topic, or TF. health and warnings must live as long as the gate.
-  InputGate(const NodeOptions& options, const std::string& odometry_source, const std::string& scan_topic,
+  /// odometry_source: a topic, or TF. scan_topics: one for each laser. health and warnings must live as long as the
+  /// gate.
+  InputGate(const NodeOptions& options, const std::string& odometry_source, const std::vector<std::string>& scan_topics,
             Health& health, Warnings& warnings);
 
-  /// What may be used now that the message has come.
-  Scans admit(const sensor_msgs::LaserScan::ConstPtr& message);
-  Scans admit(const sensor_msgs::PointCloud2::ConstPtr& message);
+  /// What of a laser, or of what else makes clouds, may be used now that the message has come.
+  Scans admit(const sensor_msgs::LaserScan::ConstPtr& message, std::size_t laser = 0);
+  Scans admit(const sensor_msgs::PointCloud2::ConstPtr& message, std::size_t laser = 0);
 
   /// The same of odometry from a topic; tf relates its frame to base_frame. What its twist covariance is worth is
   /// looked at where it would be used.
@@ -36,7 +38,7 @@ class InputGate {
   Samples admit(const OdometrySample& sample);
 
   /// kind: for the count, reason: value and what is expected.
-  void refuseScan(const std::string& kind, const std::string& reason);
+  void refuseScan(std::size_t laser, const std::string& kind, const std::string& reason);
   void refuseOdometry(const std::string& kind, const std::string& reason);
 
   /// Time went back, as odometry or scans have told: the others will follow.
@@ -44,19 +46,20 @@ class InputGate {
 
   Stamp newestOdometry() const { return odometry_stamps_.newest(); }
   std::size_t odometryHeldBack() const { return odometry_stamps_.heldBack(); }
-  std::size_t scansHeldBack() const { return scan_stamps_.heldBack(); }
+  std::size_t scansHeldBack() const;
 
  private:
-  Scans admit(const Scan& message, const std::string& kind, const std::string& problem);
+  Scans admit(const Scan& message, std::size_t laser, const std::string& kind, const std::string& problem);
   Samples admitByStamp(const OdometrySample& sample);
+  Stamp newestScan() const;
   void warnOfHeldBack(const std::string& what, Stamp stamp);
 
   std::string odometry_source_;
-  std::string scan_topic_;
+  std::vector<std::string> scan_topics_;
   Health& health_;
   Warnings& warnings_;
   StampGuard<OdometrySample> odometry_stamps_;
-  StampGuard<Scan> scan_stamps_;
+  std::vector<StampGuard<Scan>> scan_stamps_;  // of each laser
 };
 
 }  // namespace sckf

@@ -7,13 +7,15 @@
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
 namespace sckf {
 
 struct ParameterValue {
-  using List = std::monostate;  ///< a list or anything else that no parameter of the package can be
+  using Other = std::monostate;  ///< what no parameter of the package can be
+  using Texts = std::vector<std::string>;
 
-  std::variant<List, bool, int, double, std::string> value;
+  std::variant<Other, bool, int, double, std::string, Texts> value;
   std::string text;  ///< as it is shown to the user
 };
 

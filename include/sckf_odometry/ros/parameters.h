@@ -15,9 +15,10 @@ namespace sckf {
 
 /// What only the ROS layer needs to know.
 struct NodeOptions {
-  std::string odom_frame = "odom";       ///< frame of the estimate
-  std::string base_frame = "base_link";  ///< frame of the robot
-  bool publish_tf = true;                ///< publish odom_frame → base_frame on TF
+  std::vector<std::string> scan_topics{"scan"};  ///< one for each laser
+  std::string odom_frame = "odom";               ///< frame of the estimate
+  std::string base_frame = "base_link";          ///< frame of the robot
+  bool publish_tf = true;                        ///< publish odom_frame → base_frame on TF
   bool invert_odom_tf = false;    ///< publish base_frame → odom_frame: where base_frame has another parent already
   std::string map_frame = "map";  ///< frame of absolute poses
   bool publish_map_tf = false;    ///< publish map_frame → odom_frame on TF, where absolute poses are used
@@ -37,6 +38,9 @@ struct NodeOptions {
   std::size_t cloud_max_points = 200000;   ///< beyond, the oldest points are forgotten
 };
 
+/// scan_topics; of clouds, where it is at its default, cloud_in.
+std::vector<std::string> rangeTopics(const NodeOptions& options);
+
 /// Everything that can be set from outside.
 struct Options {
   PipelineOptions pipeline;
@@ -55,7 +59,7 @@ struct Range {
 };
 
 struct Parameter {
-  using Field = std::variant<bool*, int*, std::size_t*, double*, std::string*>;
+  using Field = std::variant<bool*, int*, std::size_t*, double*, std::string*, std::vector<std::string>*>;
 
   std::string name;
   Field field;

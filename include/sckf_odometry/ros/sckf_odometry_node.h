@@ -53,8 +53,8 @@ class ScKfOdometryNode {
   void startTimers(ros::NodeHandle& nh);
   Services::Actions serviceActions();
 
-  void onScan(const sensor_msgs::LaserScan::ConstPtr& message);
-  void onCloud(const sensor_msgs::PointCloud2::ConstPtr& message);
+  void onScan(std::size_t laser, const sensor_msgs::LaserScan::ConstPtr& message);
+  void onCloud(std::size_t laser, const sensor_msgs::PointCloud2::ConstPtr& message);
   void onImu(const sensor_msgs::Imu::ConstPtr& message);
   void onPoseUpdate(const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& message);
   void onOdometry(const nav_msgs::Odometry::ConstPtr& message);
@@ -67,7 +67,7 @@ class ScKfOdometryNode {
   template <typename Callback>
   void guarded(const Callback& callback);
 
-  void addScans(const InputGate::Scans& admission);
+  void addScans(std::size_t laser, const InputGate::Scans& admission);
   void addOdometry(const InputGate::Samples& admission);
   void addOdometry(const OdometrySample& sample);
 
@@ -90,8 +90,8 @@ class ScKfOdometryNode {
   std::string waitingFor() const;  ///< empty if for nothing
 
   Options options_;
-  std::mutex mutex_;  // of all that follows
-  std::string scan_topic_;
+  std::mutex mutex_;                      // of all that follows
+  std::vector<std::string> scan_topics_;  // of each laser
   std::string odometry_source_;
   std::unique_ptr<ScanOdometry> pipeline_;
   TfInput tf_;
@@ -105,7 +105,11 @@ class ScKfOdometryNode {
   InputGate gate_;
   ImuInput imu_;
   PoseUpdateInput pose_updates_;
-  std::deque<Scan> scans_without_mount_;
+  struct ScanWithoutMount {
+    std::size_t laser;
+    Scan message;
+  };
+  std::deque<ScanWithoutMount> scans_without_mount_;
   std::string mount_problem_;  // of the newest scan that waits for its mount
   bool paused_ = false;
 
