@@ -93,6 +93,9 @@ PipelineOptions options(Bytes& bytes) {
   options.gate.trust_scans_on_slip = bytes.chance();
   options.deskew = bytes.chance();
   options.odometry_noise.model = odometryModelNames()[static_cast<std::size_t>(bytes.upTo(2))];
+  const auto use = static_cast<std::size_t>(bytes.upTo(2));
+  if (options.method == "sckf_multi") options.landmarks.use = landmarkUses()[use];
+  options.landmarks.max = 1 + bytes.upTo(9);
   options.scan.max_beams = bytes.chance() ? 60 : 400;
   switchOthersOn(options, bytes);
   return options;
@@ -308,6 +311,7 @@ class Driver {
     PipelineOptions changed = options(bytes_);
     changed.method = pipeline_.options().method;
     switchOthersOn(changed, bytes_);
+    if (changed.method != "sckf_multi") changed.landmarks.use = "none";
     pipeline_.setOptions(changed);
   }
 

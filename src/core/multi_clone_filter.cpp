@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "sckf_odometry/core/covariance.h"
+#include "sckf_odometry/core/world_error.h"
 
 namespace sckf {
 
@@ -14,48 +15,14 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
+using world_error::additive;
+using world_error::adjoint;
+using world_error::exponential;
+using world_error::inverseOfAdditive;
+using world_error::logarithm;
 
 constexpr double kNoBound = std::numeric_limits<double>::infinity();
 const Eigen::RowVector3d kYaw(0.0, 0.0, 1.0);
-
-/// 𝒥 p: p turned by a quarter.
-Eigen::Vector2d quarterTurn(const Eigen::Vector2d& p) { return {-p.y(), p.x()}; }
-
-/// T: the additive error X̃ = T ξ of a pose.
-Matrix3d additive(const SE2& pose) {
-  Matrix3d T = Matrix3d::Identity();
-  T.topRightCorner<2, 1>() = quarterTurn(pose.translation());
-  return T;
-}
-
-Matrix3d inverseOfAdditive(const SE2& pose) { return additive(SE2(-pose.x, -pose.y, 0.0)); }
-
-/// ξ of a pose that is displaced with its world by d, by ξ before.
-Matrix3d adjoint(const SE2& d) {
-  Matrix3d Ad = Matrix3d::Identity();
-  Ad.topLeftCorner<2, 2>() = d.rotation();
-  Ad.topRightCorner<2, 1>() = -quarterTurn(d.translation());
-  return Ad;
-}
-
-/// Length of a chord over that of its arc of 2 half radians.
-double chord(double half) { return std::abs(half) < 1e-9 ? 1.0 : std::sin(half) / half; }
-
-/// exp(ξ): the displacement that ξ = (ρ, θ) makes along a circular arc. Without the arc, a correction of the yaw would
-/// not turn a pose far from the origin about itself.
-SE2 exponential(const Vector3d& xi) {
-  const double half = 0.5 * xi.z();
-  const Eigen::Vector2d t = chord(half) * (SE2(0.0, 0.0, half).rotation() * xi.head<2>());
-  return {t.x(), t.y(), xi.z()};
-}
-
-/// ξ with exp(ξ) = d.
-Vector3d logarithm(const SE2& d) {
-  const double yaw = wrapAngle(d.yaw);
-  Vector3d xi;
-  xi << SE2(0.0, 0.0, -0.5 * yaw).rotation() * d.translation() / chord(0.5 * yaw), yaw;
-  return xi;
-}
 
 /// A gyro or a compass knows what the wheels cannot: where they contradict it they have slipped, by about r.
 void allowForSlip(const MotionMeasurement& z, const Innovation::Vector& r, const MatrixXd& S, Matrix3d& Q) {
@@ -315,6 +282,7 @@ void MultiCloneFilter::enterWorld(const PoseMeasurement& world_from_base) {
   };
   enter(pose_, pose_error_);
   for (Clone& clone : clones_) enter(clone.pose, clone.error);
+  for (Landmark& landmark : landmarks_) enter(landmark.pose, landmark.error);
   compass_from_world_ -= d.yaw;
   if (compass_error_) errors_.move(*compass_error_, -kYaw, unknown);
   errors_.remove(unknown);
@@ -329,6 +297,7 @@ std::vector<ErrorState::Part> MultiCloneFilter::statesNotCloned() const {
   for (const auto& part : {calibration_error_, gyro_bias_error_, compass_error_}) {
     if (part) parts.push_back(*part);
   }
+  for (const Landmark& landmark : landmarks_) parts.push_back(landmark.error);
   return parts;
 }
 
@@ -349,6 +318,9 @@ void MultiCloneFilter::correct(const Measurement& measurement, const std::vector
     if (is(compass_error_)) compass_from_world_ += c(0);
     for (Clone& clone : clones_) {
       if (is(clone.error)) clone.pose = compose(exponential(c), clone.pose);
+    }
+    for (Landmark& landmark : landmarks_) {
+      if (is(landmark.error)) landmark.pose = compose(exponential(c), landmark.pose);
     }
   }
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "sckf_odometry/core/covariance.h"
+#include "sckf_odometry/matching/line_fit.h"
 
 namespace sckf {
 
@@ -49,18 +50,13 @@ void addSurfaceDerivatives(const AlignmentProblem& problem, const Residual& resi
                            LossDerivatives& out) {
   const Surface& surface = *residual.surface;
   const ScannedPoints& points = problem.reference().points;
-  const Eigen::Vector2d& n = surface.normal;
-  const Eigen::Vector2d tangent = surface.tangent();
-  const double along = tangent.dot(t.offset);
+  const double along = surface.tangent().dot(t.offset);
   const Eigen::Vector3d by_angle = problem.kernel().influence(t.e) * AlignmentProblem::derivativeByNormal(residual, t);
   const Eigen::Vector3d by_residual = problem.kernel().slope(t.e) / residual.std * t.A;
   for (int j = surface.first; j <= surface.last; ++j) {
-    const auto k = static_cast<std::size_t>(j);
-    const Eigen::Vector2d d = points.point[k] - surface.centroid;
-    const Eigen::Vector2d& ray = points.ray[k];
-    const double turn = -(tangent.dot(ray) * n.dot(d) + tangent.dot(d) * n.dot(ray)) / surface.spread;
-    const double shift = -n.dot(ray) / surface.size() + along * turn;
-    out.by_reference.col(points.beam[k]) += by_angle * turn + by_residual * shift;
+    const double turn = turnByRange(surface, points, j);
+    const double shift = -shiftByRange(surface, points, j) + along * turn;
+    out.by_reference.col(points.beam[static_cast<std::size_t>(j)]) += by_angle * turn + by_residual * shift;
   }
 }
 

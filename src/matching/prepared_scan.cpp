@@ -105,6 +105,15 @@ ScannedPoints readings(const LaserScan& scan, const Eigen::Isometry3d& base_from
   return points;
 }
 
+/// Surfaces and map of the points.
+void describe(PreparedScan& scan, const SurfaceOptions& options) {
+  scan.surface = fitSurfaces(scan.points, scan.range_noise, scan.angle_increment, options);
+  scan.map.reserve(scan.size());
+  for (const Eigen::Vector2d& p : scan.points.point) {
+    scan.map.insertPointFast(static_cast<float>(p.x()), static_cast<float>(p.y()), 0.0F);
+  }
+}
+
 }  // namespace
 
 Eigen::VectorXd PreparedScan::rangeVariances() const {
@@ -138,13 +147,32 @@ std::shared_ptr<const PreparedScan> prepareScan(const LaserScan& scan, const Eig
            << range_max << ") m: expected at least " << options.min_points;
     return reject(reason.str());
   }
+  prepared->angle_increment = scan.angle_increment;
   prepared->range_noise = estimateRangeNoise(prepared->points, scan.angle_increment, options);
-  prepared->surface = fitSurfaces(prepared->points, prepared->range_noise, scan.angle_increment, options.surface);
-  prepared->map.reserve(prepared->size());
-  for (const Eigen::Vector2d& p : prepared->points.point) {
-    prepared->map.insertPointFast(static_cast<float>(p.x()), static_cast<float>(p.y()), 0.0F);
-  }
+  describe(*prepared, options.surface);
   return prepared;
+}
+
+std::shared_ptr<const PreparedScan> setAside(const PreparedScan& scan, const std::vector<bool>& aside,
+                                             const SurfaceOptions& options) {
+  auto rest = std::make_shared<PreparedScan>();
+  rest->stamp = scan.stamp;
+  rest->beams = scan.beams;
+  rest->angle_increment = scan.angle_increment;
+  rest->range_noise = scan.range_noise;
+  rest->set_aside = scan.set_aside;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    if (aside[i]) {
+      rest->set_aside.push_back(scan.points.point[i]);
+      continue;
+    }
+    rest->points.beam.push_back(scan.points.beam[i]);
+    rest->points.range.push_back(scan.points.range[i]);
+    rest->points.ray.push_back(scan.points.ray[i]);
+    rest->points.point.push_back(scan.points.point[i]);
+  }
+  describe(*rest, options);
+  return rest;
 }
 
 }  // namespace sckf

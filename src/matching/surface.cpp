@@ -3,61 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sckf_odometry/matching/line_fit.h"
+
 namespace sckf {
 
 namespace {
 
-/// Running sums over the points, so that the line through any stretch of them costs O(1).
-class Moments {
- public:
-  explicit Moments(const std::vector<Eigen::Vector2d>& points) : sums_(points.size() + 1, Sums::Zero()) {
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const Eigen::Vector2d& p = points[i];
-      sums_[i + 1] = sums_[i];
-      sums_[i + 1] += (Sums() << p.x(), p.y(), p.x() * p.x(), p.x() * p.y(), p.y() * p.y()).finished();
-    }
-  }
-
-  struct Fit {
-    Surface surface;
-    double scatter;  ///< std of the points across the line [m]
-  };
-
-  /// The total least squares line through the points first … last.
-  Fit fit(int first, int last) const {
-    const double n = last - first + 1;
-    const Sums s = sums_[static_cast<std::size_t>(last) + 1] - sums_[static_cast<std::size_t>(first)];
-    const Eigen::Vector2d c = s.head<2>() / n;
-    const double xx = s(2) - n * c.x() * c.x();
-    const double xy = s(3) - n * c.x() * c.y();
-    const double yy = s(4) - n * c.y() * c.y();
-    const double half_spread = std::hypot(0.5 * (xx - yy), xy);
-    const double direction = 0.5 * std::atan2(xy, 0.5 * (xx - yy));
-    const double across = std::max(0.0, 0.5 * (xx + yy) - half_spread);
-    const Eigen::Vector2d normal(-std::sin(direction), std::cos(direction));
-    return {{c, normal, first, last, 2.0 * half_spread}, std::sqrt(across / std::max(1.0, n - 2.0))};
-  }
-
- private:
-  using Sums = Eigen::Matrix<double, 5, 1>;
-  std::vector<Sums> sums_;
-};
-
-/// Whether the points i and i + 1 can lie on one surface: no farther apart than on a surface seen at a grazing angle
-/// (the adaptive breakpoint of Borges and Aldon).
-bool connected(const ScannedPoints& points, std::size_t i, double range_noise, double angle_increment) {
-  constexpr double kGrazing = 8.0 * M_PI / 180.0;
-  constexpr int kMaxBeams = 3;
-  const int beams = points.beam[i + 1] - points.beam[i];
-  const double step = beams * std::abs(angle_increment);
-  if (beams > kMaxBeams || step >= kGrazing) return false;
-  const double reach = points.range[i] * std::sin(step) / std::sin(kGrazing - step);
-  return (points.point[i + 1] - points.point[i]).norm() <= reach + 3.0 * range_noise;
-}
-
 /// The longest stretch around point i, within [begin, end], that is straight within the noise. Noise makes a short
 /// stretch look bent now and then: one that is not straight ends the search only if the next longer one is not either.
-Surface growSurface(const ScannedPoints& points, const Moments& moments, int i, int begin, int end, double range_noise,
+Surface growSurface(const ScannedPoints& points, const LineFits& fits, int i, int begin, int end, double range_noise,
                     const SurfaceOptions& options) {
   Surface longest;
   bool bent = false;
@@ -65,7 +19,7 @@ Surface growSurface(const ScannedPoints& points, const Moments& moments, int i, 
     const int first = std::max(begin, i - half);
     const int last = std::min(end, i + half);
     if (last - first < 3) continue;
-    const Moments::Fit candidate = moments.fit(first, last);
+    const LineFits::Fit candidate = fits.fit(first, last);
     if (candidate.scatter > options.straightness * range_noise) {
       if (bent) break;
       bent = true;
@@ -107,7 +61,7 @@ const Surface* surfaceOfNeighbours(const ScannedPoints& points, const std::vecto
 
 std::vector<Surface> fitSurfaces(const ScannedPoints& points, double range_noise, double angle_increment,
                                  const SurfaceOptions& options) {
-  const Moments moments(points.point);
+  const LineFits fits(points.point);
   const int n = static_cast<int>(points.size());
   std::vector<Surface> surfaces(points.size());
   for (int begin = 0, end = 0; begin < n; begin = end + 1) {
@@ -115,7 +69,7 @@ std::vector<Surface> fitSurfaces(const ScannedPoints& points, double range_noise
     while (end + 1 < n && connected(points, static_cast<std::size_t>(end), range_noise, angle_increment)) ++end;
     for (int i = begin; i <= end; ++i) {
       const auto k = static_cast<std::size_t>(i);
-      Surface surface = growSurface(points, moments, i, begin, end, range_noise, options);
+      Surface surface = growSurface(points, fits, i, begin, end, range_noise, options);
       if (!hasDirection(surface, range_noise, options)) continue;
       if (surface.normal.dot(points.ray[k]) > 0.0) surface.normal = -surface.normal;
       surfaces[k] = surface;

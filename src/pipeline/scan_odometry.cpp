@@ -46,6 +46,17 @@ void checkLasers(const PipelineOptions& options) {
                               options.method + "\": expected one laser, or more and method \"sckf_multi\"");
 }
 
+void checkLandmarks(const PipelineOptions& options) {
+  if (!options.landmarks.on()) return;
+  if (options.pose_updates.on) {
+    throw std::invalid_argument("landmarks is \"" + options.landmarks.use +
+                                "\": expected \"none\" with use_pose_updates: the estimate in map has none");
+  }
+  if (options.method == "sckf_multi") return;
+  throw std::invalid_argument("landmarks is \"" + options.landmarks.use + "\": expected \"none\" with method \"" +
+                              options.method + "\"; only \"sckf_multi\" has states beside the pose");
+}
+
 void checkPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance) {
   constexpr double kLargest = 1e9;  // beyond, doubles tell centimetres no more
   const Eigen::Vector3d pose = odom_from_base.vector();
@@ -77,11 +88,13 @@ ScanOdometry::ScanOdometry(const PipelineOptions& options, const SE2& odom_from_
       imu_(options.imu.timeout),
       twist_(options.twist_window),
       start_(odom_from_base),
-      start_covariance_(covariance) {
+      start_covariance_(covariance),
+      landmarks_(options.landmarks) {
   checkMethod(options.method);
   checkStates(options);
   modelledIncrement(SE2(), options.odometry_noise);  // throws if there is no such model
   checkLasers(options);
+  checkLandmarks(options);
   checkPose(odom_from_base, covariance);
 }
 
@@ -167,18 +180,21 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   report.wheels_known = std::exchange(wheels_known_, true);
   report.scan =
       prepareScan(waiting.scan, waiting.base_from_laser, options_.scan, &report.reason, motionDuring(waiting));
+  if (report.scan) claimLandmarks(report);
   if (!report.scan) {
     report.outcome = ScanOutcome::kUnusable;
-  } else if (const auto reference = references_.newestOf(waiting.laser)) {
-    compareWithReference(*reference, report);  // (16)-(23)
-  } else {
+  } else if (const auto reference = references_.newestOf(waiting.laser); !reference) {
     report.new_reference = true;
+  } else if (options_.landmarks.withDisplacements()) {
+    compareWithReference(*reference, report);  // (16)-(23)
   }
+  if (report.scan) useLandmarks(report);
   if (at_before) followScans(before, *at_before, report);
   if (report.new_reference) {
     compareWithOlderReferences(report);
     filter_->clone(report.scan->rangeVariances());  // (24)-(27)
     references_.add(report.scan, report.laser, options_.reference.kept, *filter_);
+    landmarks_.countReference();
   }
   report.estimate = estimate();
   report.in_map = inMap();
@@ -259,6 +275,26 @@ Displacement::MatrixDD ScanOdometry::slackAmongLasers(const Displacement& displa
   return displacement.observable * slack * displacement.observable.transpose();
 }
 
+MultiCloneFilter* ScanOdometry::landmarkFilter() const {
+  return options_.landmarks.on() ? dynamic_cast<MultiCloneFilter*>(filter_.get()) : nullptr;
+}
+
+void ScanOdometry::claimLandmarks(ScanReport& report) {
+  const MultiCloneFilter* filter = landmarkFilter();
+  if (filter == nullptr) return;
+  report.scan = landmarks_.claim(report.scan, *filter, options_.reference, options_.scan.surface);
+}
+
+void ScanOdometry::useLandmarks(ScanReport& report) {
+  MultiCloneFilter* filter = landmarkFilter();
+  if (filter == nullptr) return;
+  report.landmarks_used = landmarks_.update(*filter, options_.reference);
+  report.landmarks = landmarks_.views(*filter);
+  if (options_.landmarks.withDisplacements() || report.new_reference) return;
+  report.outcome = report.landmarks_used > 0 ? ScanOutcome::kUpdated : ScanOutcome::kNoMatch;
+  if (report.landmarks_used == 0) report.reason = "no landmark seen, and displacements are not used";
+}
+
 double ScanOdometry::gate(const Displacement& displacement) const {
   return chiSquared(displacement.dimension(), options_.gate.probability);
 }
@@ -293,9 +329,11 @@ void ScanOdometry::setOptions(const PipelineOptions& options) {
   }
   modelledIncrement(SE2(), options.odometry_noise);  // throws if there is no such model
   checkStates(options);
+  checkLandmarks(options);
   options_ = options;
   matcher_ = ScanMatcher(options.matcher);
   for (Laser& laser : lasers_) laser.policy.setOptions(options.reference);
+  landmarks_.setOptions(options.landmarks);
   odometry_.setLimits(options.motion, options.odometry_timeout);
   twist_.setDuration(options.twist_window);
 }
@@ -321,6 +359,7 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
     laser.policy = ReferencePolicy(options_.reference);
     laser.taken.reset();
   }
+  landmarks_ = Landmarks(options_.landmarks);
   carried_on_.reset();
   carryOn();
 }
@@ -455,7 +494,8 @@ void ScanOdometry::followScans(Stamp since, const DisplacementPrediction& at_sin
   const SE2 motion = between(at_since.reference_from_current, now.reference_from_current, &A, &B);
   twist_.add({motion, symmetric(A * at_since.covariance * A.transpose() + B * now.covariance * B.transpose())},
              seconds(report.stamp - since));
-  if (wasUsed(report.outcome) && report.match.displacement->dimension() == 3) motion_known_ = report.stamp;
+  const auto& displacement = report.match.displacement;
+  if (wasUsed(report.outcome) && displacement && displacement->dimension() == 3) motion_known_ = report.stamp;
 }
 
 MotionGuess ScanOdometry::guess() const { return {twist_.twist().mean, motion_known_}; }

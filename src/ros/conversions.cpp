@@ -266,6 +266,8 @@ sckf_odometry::Status toStatus(const ScanReport& report, const std::string& meth
   status.accepted = wasUsed(report.outcome);
   status.new_reference = report.new_reference;
   status.older_references = static_cast<std::uint8_t>(std::min(report.older_references, 255));
+  status.landmarks = static_cast<std::uint16_t>(report.landmarks.size());
+  status.landmarks_used = static_cast<std::uint16_t>(report.landmarks_used);
   status.wheels_known = report.wheels_known;
   status.deskewed = report.deskewing == Deskewing::kDone;
   status.pairs = static_cast<uint32_t>(report.match.pairs.size());

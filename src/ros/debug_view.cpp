@@ -3,6 +3,7 @@
 #include <sensor_msgs/PointCloud2.h>
 
 #include "sckf_odometry/ros/conversions.h"
+#include "sckf_odometry/ros/landmark_markers.h"
 
 namespace sckf {
 
@@ -14,7 +15,9 @@ constexpr uint32_t kQueue = 100;  // at fast replay many leave in one go
 sensor_msgs::PointCloud2 toCloud(const PlacedScan& placed, Stamp stamp, const std::string& frame) {
   std::vector<Eigen::Vector2d> points;
   if (placed.scan) {
-    for (const Eigen::Vector2d& point : placed.scan->points.point) points.push_back(placed.odom_from_base * point);
+    for (const auto& seen : {placed.scan->points.point, placed.scan->set_aside}) {
+      for (const Eigen::Vector2d& point : seen) points.push_back(placed.odom_from_base * point);
+    }
   }
   return toPointCloud(points, stamp, frame);
 }
@@ -30,7 +33,8 @@ DebugView::DebugView(ros::NodeHandle nh, const NodeOptions& options)
     : odom_frame_(options.odom_frame),
       reference_scan_(nh.advertise<sensor_msgs::PointCloud2>("debug/reference_scan", kQueue)),
       aligned_scan_(nh.advertise<sensor_msgs::PointCloud2>("debug/aligned_scan", kQueue)),
-      markers_(nh.advertise<visualization_msgs::MarkerArray>("debug/markers", kQueue)) {}
+      markers_(nh.advertise<visualization_msgs::MarkerArray>("debug/markers", kQueue)),
+      landmarks_(nh.advertise<visualization_msgs::MarkerArray>("landmarks", kQueue)) {}
 
 void DebugView::show(const ScanReport& report) {
   if (!report.estimate) return;
@@ -49,6 +53,7 @@ void DebugView::publish(const ScanReport& report) const {
   publishIfWatched(markers_, [&] {
     return compared ? debugMarkers(report, reference_, odom_frame_) : noDebugMarkers(report.stamp, odom_frame_);
   });
+  publishIfWatched(landmarks_, [&] { return landmarkMarkers(report.landmarks, report.stamp, odom_frame_); });
 }
 
 }  // namespace sckf

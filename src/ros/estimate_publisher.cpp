@@ -42,6 +42,7 @@ void EstimatePublisher::publishScan(const Estimate& estimate, const PreparedScan
   path_recorder_.add(estimate.stamp, estimate.odom_from_base);
   if (scan != nullptr) {
     cloud_recorder_.add(estimate.odom_from_base, scan->points.point);
+    cloud_recorder_.add(estimate.odom_from_base, scan->set_aside);
     cloud_stamp_ = estimate.stamp;
   }
   views_changed_ = true;

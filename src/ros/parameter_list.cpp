@@ -120,6 +120,27 @@ List otherSensors(PipelineOptions& pipeline) {
   };
 }
 
+/// Of a new estimate.
+List landmarkParameters(LandmarkOptions& landmarks) {
+  CornerOptions& corner = landmarks.corner;
+  return {
+      text("landmarks", landmarks.use, landmarkUses()),
+      number("landmarks_max", landmarks.max, within(1, 1000), "landmarks"),
+      number("landmark_sightings", landmarks.sightings, within(2, 1000), "scans"),
+      number("landmark_misses", landmarks.misses, within(1, 1000000), "scans"),
+      number("landmark_max_share", landmarks.max_share, within(0.0, 1.0)),
+      number("landmark_max_std", landmarks.max_std, aboveUpTo(0.0, 100.0), "m"),
+      number("landmark_gate_probability", landmarks.probability, strictlyWithin(0.0, 1.0)),
+      number("corner_min_length", corner.min_length, aboveUpTo(0.0, 100.0), "m"),
+      number("corner_max_length", corner.max_length, aboveUpTo(0.0, 100.0), "m"),
+      number("corner_min_points", corner.min_points, within(3, 1000), "points"),
+      number("corner_roughness", corner.roughness, within(0.0, 10.0), "m"),
+      number("corner_min_angle", corner.min_angle, within(0.1, 1.5), "rad"),
+      number("corner_std_position", corner.std_position, within(0.0, 10.0), "m"),
+      number("corner_std_yaw", corner.std_yaw, within(0.0, 10.0), "rad"),
+  };
+}
+
 List estimationParameters(PipelineOptions& pipeline) {
   ReferenceOptions& reference = pipeline.reference;
   GateOptions& gate = pipeline.gate;
@@ -196,6 +217,8 @@ std::vector<Parameter> parameterList(Options& options) {
   all.push_back(text("method", pipeline.method, fusionMethodNames()));
   const List other = otherSensors(pipeline);
   all.insert(all.end(), other.begin(), other.end());
+  const List landmarks = landmarkParameters(pipeline.landmarks);
+  all.insert(all.end(), landmarks.begin(), landmarks.end());
   for (const List& list :
        {nodeParametersAtRunTime(options.node), odometryParameters(pipeline), estimationParameters(pipeline),
         scanParameters(pipeline), matcherParameters(pipeline.matcher)}) {

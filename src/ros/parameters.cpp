@@ -142,6 +142,8 @@ void checkTogether(const Options& options, std::vector<std::string>& problems) {
                        " topics: one expected with method \"" + options.pipeline.method +
                        "\", more only with \"sckf_multi\"");
   }
+  const CornerOptions& corner = options.pipeline.landmarks.corner;
+  ordered("corner_min_length", corner.min_length, "corner_max_length", corner.max_length);
   if (node.odom_frame == node.base_frame) {
     problems.push_back("odom_frame = \"" + node.odom_frame + "\": another frame than base_frame expected");
   }

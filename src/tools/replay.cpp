@@ -133,6 +133,8 @@ class Statistics {
     ++outcomes_[report.outcome];
     ++deskewing_[report.deskewing];
     times_.push_back(time);
+    landmarks_used_ += static_cast<std::size_t>(report.landmarks_used);
+    most_landmarks_ = std::max(most_landmarks_, report.landmarks.size());
   }
 
   void print(double log_duration, double wall_time) {
@@ -143,6 +145,9 @@ class Statistics {
     }
     std::printf("\n");
     if (times_.empty()) return;
+    if (most_landmarks_ > 0) {
+      std::printf("landmarks seen %zu times, at most %zu in the state\n", landmarks_used_, most_landmarks_);
+    }
     std::sort(times_.begin(), times_.end());
     std::printf("time of a scan: median %.3f ms, 95 %% below %.3f ms, longest %.3f ms\n", 1e3 * quantile(0.5),
                 1e3 * quantile(0.95), 1e3 * times_.back());
@@ -156,6 +161,8 @@ class Statistics {
 
   std::map<ScanOutcome, std::size_t> outcomes_;
   std::map<Deskewing, std::size_t> deskewing_;
+  std::size_t landmarks_used_ = 0;
+  std::size_t most_landmarks_ = 0;
   std::vector<double> times_;
 };
 

@@ -21,6 +21,7 @@ import numpy as np
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 sys.path.insert(0, str(SCRIPTS))
 from experiment_base import ExperimentError, find_program  # noqa: E402
+from experiment_landmarks import rms_after_alignment  # noqa: E402
 from experiment_logs import Estimates, end_error, mean_nees  # noqa: E402
 from revisit import Revisit  # noqa: E402
 from trajectory import Trajectory  # noqa: E402
@@ -28,7 +29,8 @@ from trajectory import Trajectory  # noqa: E402
 RUNS = 20
 FIGURES = ("four_methods", "four_methods_covariance", "line_matching", "line_matching_nees", "line_matching_ratios",
            "displacement_only", "displacement_only_covariance", "one_dimension", "visual_odometry", "complexity",
-           "extensions_deskewing", "extensions_cloud_input", "extensions_odometry_models")
+           "extensions_deskewing", "extensions_cloud_input", "extensions_odometry_models",
+           "extensions_landmarks")
 
 
 def experiment(arguments: List[str], **options: object) -> subprocess.CompletedProcess:
@@ -144,6 +146,12 @@ class AllExperiments(unittest.TestCase):
         self.assertLess(nees["differential", "ackermann"], 0.1, "it turns on the spot, and is not believed")
 
 
+    def test_landmarks_beside_displacements_do_no_harm(self) -> None:
+        n = self.numbers("extensions")
+        self.assertLess(n["landmarks_corners_end"], n["landmarks_none_end"] + 0.3, n)
+        self.assertNotEqual(n["landmarks_corners_end"], n["landmarks_none_end"], "the corners had no part in it")
+
+
 class CommandLine(unittest.TestCase):
     def test_refuses_what_there_is_not(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
@@ -178,6 +186,18 @@ class Measures(unittest.TestCase):
         estimates = Estimates(np.array([0.0, 1.0, 2.0]), poses, np.tile(np.eye(3), (3, 1, 1)))
         error = end_error(Revisit(0, 2, np.array([1.0, 0.0, 0.0])), estimates.stamps, estimates)
         np.testing.assert_allclose([error.x, error.y, error.yaw], [-0.2, 0.3, 0.1], atol=1e-12)
+
+    def test_rms_after_alignment_leaves_out_where_the_whole_is(self) -> None:
+        stamps = np.arange(4.0)
+        square = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 2.0, 0.0], [0.0, 2.0, 0.0]])
+        cos, sin = math.cos(0.7), math.sin(0.7)
+        turned = square.copy()
+        turned[:, :2] = square[:, :2] @ np.array([[cos, sin], [-sin, cos]]) + [7.0, -3.0]
+        self.assertAlmostEqual(rms_after_alignment(Trajectory(stamps, square), Trajectory(stamps, turned)), 0.0)
+        larger = turned.copy()
+        larger[:, :2] *= 1.5  # each corner is half a diagonal off by half
+        self.assertAlmostEqual(rms_after_alignment(Trajectory(stamps, square), Trajectory(stamps, larger)),
+                               0.5 * math.sqrt(2.0))
 
     def test_nees_is_three_where_the_covariance_is_right(self) -> None:
         random = np.random.default_rng(1)

@@ -262,6 +262,8 @@ TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
   report.nis_bound = 13.8;
   report.reference_stamp = std::chrono::seconds(4);
   report.older_references = 2;
+  report.landmarks_used = 3;
+  report.landmarks.resize(7);
   report.calibration.error << 0.03, -0.02, 0.01;
   report.calibration.covariance = Eigen::Vector3d(1e-4, 4e-4, 9e-4).asDiagonal();
   report.gyro_bias = {0.01, 4e-6};
@@ -285,6 +287,8 @@ TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
   EXPECT_EQ(status.nis_bound, 13.8);
   EXPECT_EQ(status.reference_age, 3.0);
   EXPECT_EQ(status.older_references, 2);
+  EXPECT_EQ(status.landmarks_used, 3);
+  EXPECT_EQ(status.landmarks, 7);
   EXPECT_EQ(status.calibration_distance, 0.03);
   EXPECT_EQ(status.calibration_rotation, -0.02);
   EXPECT_EQ(status.calibration_rotation_per_meter, 0.01);

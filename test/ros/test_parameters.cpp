@@ -158,6 +158,7 @@ TEST(Parameters, EveryBadValueIsNamedAtOnce) {
 TEST(Parameters, ValuesThatContradictEachOtherAreRefused) {
   EXPECT_TRUE(contains(refusal("range_min: 5.0\nrange_max: 4.0\n"), "range_min = 5: less than range_max = 4 expected"));
   EXPECT_TRUE(contains(refusal("range_noise_min: 0.2\n"), "range_noise_min = 0.2: less than range_noise_max"));
+  EXPECT_TRUE(contains(refusal("corner_min_length: 2.0\n"), "corner_min_length = 2: less than corner_max_length"));
   EXPECT_TRUE(
       contains(refusal("odom_frame: base_link\n"), "odom_frame = \"base_link\": another frame than base_frame"));
   EXPECT_TRUE(contains(refusal("map_frame: /odom\n"), "map_frame = \"odom\": another frame than odom_frame and base"));

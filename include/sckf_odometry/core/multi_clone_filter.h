@@ -10,10 +10,17 @@
 
 namespace sckf {
 
+/// A landmark as one scan sees it: the pose of a frame that is fixed to it, in base_link, with the covariance of its
+/// additive error, which is independent of everything else: of ranges that nothing else uses.
+struct Sighting {
+  SE2 base_from_landmark;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+};
+
 /// An extended Kalman filter of the present pose, of every clone and, if asked for, of states that are not cloned:
-/// systematic errors of the wheels, the bias of a gyro, the heading of a compass. The range noise of the scans is
-/// considered. A displacement from the newest clone corrects all but the clones, as in Algorithm 1; one from an older
-/// clone corrects the clones too. clone() adds a clone, the newest, number 0; forget() removes one.
+/// systematic errors of the wheels, the bias of a gyro, the heading of a compass, landmarks. The range noise of the
+/// scans is considered. A displacement from the newest clone corrects all but the clones, as in Algorithm 1; one from
+/// an older clone corrects the clones too. clone() adds a clone, the newest, number 0; forget() removes one.
 ///
 /// Beyond the paper, its error state ξ = (ρ, θ) is a displacement of the world: X = exp(ξ) ⊕ X̂, so that
 ///   X̃ = T(X̂) ξ,  T = [I 𝒥p̂; 0 1].
@@ -47,6 +54,17 @@ class MultiCloneFilter : public FusionMethod {
   double updateHeading(double yaw, double variance, double nis_bound) override;
   void age(double dt) override;
 
+  /// Landmarks beside the robot (VI-5), numbered in the order in which they were added. Each is a pose, and its error
+  /// is a ξ as that of a clone: what is common to it and the robot is never taken for known either.
+  std::size_t landmarks() const { return landmarks_.size(); }
+  SE2 landmark(std::size_t number) const { return inWorld(landmarks_[number].pose); }  ///< world_from_landmark
+  Eigen::Matrix3d landmarkCovariance(std::size_t number) const;                        ///< of its additive error
+  void addLandmark(const Sighting& sighting);
+  void forgetLandmark(std::size_t number);  ///< those after it move up
+  /// What is seen less what is expected, 3, with its covariance.
+  Innovation innovation(std::size_t landmark, const Sighting& sighting) const;
+  void update(std::size_t landmark, const Sighting& sighting);
+
   /// The same robot in another world, of which only the pose there is known, to a covariance.
   void enterWorld(const PoseMeasurement& world_from_base);
 
@@ -60,6 +78,11 @@ class MultiCloneFilter : public FusionMethod {
     ErrorState::Ranges ranges;
   };
 
+  struct Landmark {
+    SE2 pose;
+    Part error;
+  };
+
   SE2 inWorld(const SE2& pose) const;
   double varianceOf(const std::optional<Part>& part) const;
   OdometryIncrement calibrated(const OdometryIncrement& increment) const;
@@ -67,6 +90,7 @@ class MultiCloneFilter : public FusionMethod {
   void forgetCalibration(double way);
   void measureMotion(const OdometryIncrement& motion, const Eigen::Matrix3d& W);
   Measurement measurement(const Displacement& displacement, const Innovation& innovation) const;
+  Measurement measurement(std::size_t landmark, const Sighting& sighting) const;
   double update(const Measurement& measurement, double nis_bound);
 
   std::vector<Part> statesNotCloned() const;
@@ -88,6 +112,7 @@ class MultiCloneFilter : public FusionMethod {
   std::optional<Part> gyro_bias_error_;
   double compass_from_world_ = 0.0;  // [rad]
   std::optional<Part> compass_error_;
+  std::vector<Landmark> landmarks_;
 };
 
 }  // namespace sckf

@@ -28,11 +28,13 @@ struct ScanOptions {
 /// Everything is in base_link at the stamp, projected to its x-y plane. Point i comes from beam points.beam[i].
 struct PreparedScan {
   Stamp stamp{0};
-  std::size_t beams = 0;             ///< M: number of ranges used of the scan, read or not
-  double range_noise = 0.0;          ///< std of one range, estimated from this scan [m]
-  ScannedPoints points;              ///< the readings
-  std::vector<Surface> surface;      ///< the surface around each point
-  mrpt::maps::CSimplePointsMap map;  ///< the same points, for CICP and for nearest neighbours
+  std::size_t beams = 0;                   ///< M: number of ranges used of the scan, read or not
+  double angle_increment = 0.0;            ///< between neighbouring beams [rad]
+  double range_noise = 0.0;                ///< std of one range, estimated from this scan [m]
+  ScannedPoints points;                    ///< the readings
+  std::vector<Surface> surface;            ///< the surface around each point
+  mrpt::maps::CSimplePointsMap map;        ///< the same points, for CICP and for nearest neighbours
+  std::vector<Eigen::Vector2d> set_aside;  ///< what else the laser has seen: points that are not to be matched
 
   std::size_t size() const { return points.size(); }
   Eigen::VectorXd rangeVariances() const;  ///< M: the diagonal of R [m²]
@@ -44,5 +46,10 @@ struct PreparedScan {
 std::shared_ptr<const PreparedScan> prepareScan(const LaserScan& scan, const Eigen::Isometry3d& base_from_laser,
                                                 const ScanOptions& options, std::string* rejection = nullptr,
                                                 const ScanMotion& motion = {});
+
+/// The scan with some of its points set aside: no range of theirs has a part in what is left, not in a surface either.
+/// aside: for each point.
+std::shared_ptr<const PreparedScan> setAside(const PreparedScan& scan, const std::vector<bool>& aside,
+                                             const SurfaceOptions& options);
 
 }  // namespace sckf

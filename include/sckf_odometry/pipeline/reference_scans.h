@@ -33,7 +33,7 @@ class ReferenceScans {
   std::vector<std::size_t> worthComparing(std::size_t laser, const FusionMethod& filter,
                                           const ReferenceOptions& options) const;
 
-  /// What the filter's covariance does not tell of a displacement from a clone, 3 × 3.
+  /// referenceSlack() of a displacement from a clone.
   Eigen::Matrix3d slack(std::size_t clone, const ReferenceOptions& options) const;
 
  private:
@@ -46,5 +46,8 @@ class ReferenceScans {
 
   std::deque<Reference> references_;
 };
+
+/// What the filter's covariance does not tell of a displacement over so many references, 3 × 3.
+Eigen::Matrix3d referenceSlack(std::size_t references, const ReferenceOptions& options);
 
 }  // namespace sckf

@@ -12,6 +12,7 @@
 #include "sckf_odometry/core/fusion_method.h"
 #include "sckf_odometry/matching/scan_matcher.h"
 #include "sckf_odometry/pipeline/imu_buffer.h"
+#include "sckf_odometry/pipeline/landmarks.h"
 #include "sckf_odometry/pipeline/odometry_buffer.h"
 #include "sckf_odometry/pipeline/other_sensors.h"
 #include "sckf_odometry/pipeline/pose_updates.h"
@@ -46,6 +47,7 @@ struct PipelineOptions {
   MatcherOptions matcher;
   ReferenceOptions reference;
   GateOptions gate;
+  LandmarkOptions landmarks;
   MotionLimits motion;
   double twist_window = 0.2;      ///< [s] the twist is the mean over this time: stamps of odometry come in bursts
   double max_scan_delay = 5.0;    ///< [s] a scan that is older than the newest odometry by more is not used
@@ -120,6 +122,9 @@ class ScanOdometry {
   bool fuse(ScanReport& report);
   void compareWithOlderReferences(ScanReport& report);
   Displacement::MatrixDD slackAmongLasers(const Displacement& displacement) const;
+  MultiCloneFilter* landmarkFilter() const;  ///< null where landmarks are not used
+  void claimLandmarks(ScanReport& report);
+  void useLandmarks(ScanReport& report);
   double gate(const Displacement& displacement) const;  ///< a larger innovation, normalised and squared, contradicts
   bool looksLikeSlip(const Match& match) const;
   ScanMotion motionDuring(const WaitingScans::Entry& waiting) const;
@@ -174,6 +179,7 @@ class ScanOdometry {
   double gyro_time_ = 0.0;    // [s] measured by a gyro, since then
   Standstill standstill_;     // up to filter_stamp_
   ReferenceScans references_;
+  Landmarks landmarks_;
   std::optional<DeadReckoning> carried_on_;  // the estimate, from filter_stamp_ on by the wheels to carried_on_stamp_ …
   Stamp carried_on_stamp_{0};
   Standstill carried_on_standstill_;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "sckf_odometry/matching/scan_matcher.h"
 #include "sckf_odometry/pipeline/pose_updates.h"
@@ -23,7 +24,7 @@ struct Estimate {
 /// What became of a scan.
 enum class ScanOutcome {
   kReference,   ///< the first scan: it became the reference, there is nothing to compare it with
-  kUpdated,     ///< its displacement corrected the estimate
+  kUpdated,     ///< its displacement corrected the estimate; where displacements are not used: its landmarks did
   kSlip,        ///< its displacement contradicts the wheels, and corrected the estimate: the wheels slipped
   kGated,       ///< its displacement contradicts the prediction beyond the gate: the wheels carry on
   kNoMatch,     ///< there is no displacement: the wheels carry on
@@ -33,7 +34,7 @@ enum class ScanOutcome {
 };
 std::string toString(ScanOutcome outcome);
 
-/// Its displacement corrected the estimate.
+/// It corrected the estimate.
 bool wasUsed(ScanOutcome outcome);
 
 /// What became of a heading.
@@ -43,6 +44,13 @@ enum class HeadingUse {
   kContradicts,  ///< it contradicts the estimate beyond the gate
 };
 std::string toString(HeadingUse use);
+
+/// A landmark of the state.
+struct LandmarkView {
+  SE2 odom_from_landmark;
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< of its position
+  bool used = false;                                     ///< the scan has seen it
+};
 
 struct ScanReport {
   Stamp stamp{0};
@@ -66,6 +74,8 @@ struct ScanReport {
   std::optional<MapEstimate> in_map;         ///< then; empty before the first absolute pose
   Deskewing deskewing = Deskewing::kOff;     ///< what became of the motion during the scan
   std::string deskewing_problem;             ///< in words, where it could not be undone
+  int landmarks_used = 0;                    ///< so many landmarks corrected the estimate …
+  std::vector<LandmarkView> landmarks;       ///< … of these, after the scan
   double match_time = 0.0;                   ///< [s] spent on the comparison with the reference …
   double total_time = 0.0;                   ///< [s] … and on the scan on the whole
   std::shared_ptr<const PreparedScan> scan;  ///< its points in base_link; null if it was not used

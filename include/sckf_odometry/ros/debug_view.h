@@ -10,8 +10,8 @@
 namespace sckf {
 
 /// Publishes debug/reference_scan and debug/aligned_scan (sensor_msgs/PointCloud2) and debug/markers
-/// (visualization_msgs/MarkerArray, see debugMarkers()), all in odom_frame and at the scan's stamp. A topic to which
-/// nobody subscribes costs nothing.
+/// (visualization_msgs/MarkerArray, see debugMarkers()), and landmarks (the same, see landmarkMarkers()), all in
+/// odom_frame and at the scan's stamp. A topic to which nobody subscribes costs nothing.
 class DebugView {
  public:
   DebugView(ros::NodeHandle nh, const NodeOptions& options);
@@ -27,6 +27,7 @@ class DebugView {
   ros::Publisher reference_scan_;
   ros::Publisher aligned_scan_;
   ros::Publisher markers_;
+  ros::Publisher landmarks_;
   PlacedScan reference_;  // its scan is null before the first
 };
 

@@ -1,0 +1,107 @@
+// Which corners of the scans are landmarks: when one enters the state, which one a scan sees again, when it is given
+// up.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "sckf_odometry/core/multi_clone_filter.h"
+#include "sckf_odometry/matching/corners.h"
+#include "sckf_odometry/pipeline/reference_policy.h"
+#include "sckf_odometry/pipeline/scan_report.h"
+
+namespace sckf {
+
+struct LandmarkOptions {
+  std::string use = "none";  ///< one of landmarkUses()
+  int max = 60;              ///< landmarks in the state; beyond, the one that has not been seen for longest is given up
+  int sightings = 3;         ///< scans that see a corner before it becomes a landmark …
+  int misses = 10;           ///< … and scans that should see it and do not until it is none any more
+  double max_share = 0.5;    ///< of a scan's points that landmarks may take from its match
+  double max_std = 0.1;      ///< [m] a place that is known worse is not compared with a corner
+  double probability = 0.99;  ///< χ²: a corner that is less likely than 1 − this is another one
+  CornerOptions corner;
+
+  bool on() const { return use != "none"; }
+  bool withDisplacements() const { return use != "corners_only"; }
+};
+
+/// none; corners: beside the displacements, which get all other points; corners_only: displacements are not used.
+const std::vector<std::string>& landmarkUses();
+
+/// For each scan, in this order: claim(), the displacements if any, update(). A range has a part in a landmark or in a
+/// displacement, never in both: what claim() takes out of a scan is in no match, neither as the scan nor as a
+/// reference.
+class Landmarks {
+ public:
+  explicit Landmarks(const LandmarkOptions& options) : options_(options) {}
+
+  /// From the next scan on.
+  void setOptions(const LandmarkOptions& options) { options_ = options; }
+
+  /// Finds the corners of a scan at the filter's pose and sets those aside that are, or may become, landmarks.
+  /// reference, here as below: what the estimate may be off beyond its covariance.
+  std::shared_ptr<const PreparedScan> claim(std::shared_ptr<const PreparedScan> scan, const MultiCloneFilter& filter,
+                                            const ReferenceOptions& reference, const SurfaceOptions& surface);
+
+  /// Corrects the filter by the landmarks that the scan sees again, begins new ones, gives up those that are gone.
+  /// Returns how many have been used.
+  int update(MultiCloneFilter& filter, const ReferenceOptions& reference);
+
+  /// The scan has become a reference.
+  void countReference();
+
+  std::vector<LandmarkView> views(const MultiCloneFilter& filter) const;
+
+ private:
+  /// What is known of a landmark beside its state; in the order of the filter's.
+  struct Known {
+    double angle = 0.0;     // between the walls [rad]
+    double farthest = 0.0;  // [m] from which it has been seen
+    int misses = 0;         // since it was last seen
+    int references = 0;     // since it was last seen
+    std::size_t seen = 0;   // number of the last scan that saw it
+  };
+  /// A corner that is not, or not yet, a landmark.
+  struct Candidate {
+    SE2 odom_from_corner;
+    double angle = 0.0;
+    int sightings = 1;
+    std::size_t seen = 0;
+  };
+  struct Sight {
+    Corner corner;
+    bool claimed = false;
+    bool used = false;
+  };
+  struct Association {
+    std::size_t sight = 0;
+    std::size_t landmark = 0;
+    double std = 0.0;  // [m] of where the landmark was expected
+  };
+  enum class Stage { kClaim, kUpdate };
+
+  static Eigen::Matrix3d slackOf(const Known& known, const ReferenceOptions& reference);
+  std::vector<Association> compatible(const MultiCloneFilter& filter, const ReferenceOptions& reference,
+                                      Stage stage) const;
+  static const Association* mostCertain(const std::vector<Association>& all);
+  const Candidate* candidateFor(const Corner& corner, const SE2& odom_from_base) const;
+  void giveWay(std::size_t points);
+  bool shouldSee(const SE2& base_from_landmark, double farthest) const;
+  void giveUp(std::size_t landmark, MultiCloneFilter& filter);
+  void giveUpMissed(MultiCloneFilter& filter);
+  bool isNearLandmark(const Corner& corner, const MultiCloneFilter& filter) const;
+  void beginNew(MultiCloneFilter& filter);
+  void remember(const Corner& corner, const SE2& odom_from_base);
+
+  LandmarkOptions options_;
+  std::vector<Known> known_;
+  std::vector<Candidate> candidates_;
+  std::size_t scans_ = 0;
+
+  std::shared_ptr<const PreparedScan> scan_;  // the present one, whole
+  std::vector<Sight> sights_;                 // its corners
+};
+
+}  // namespace sckf

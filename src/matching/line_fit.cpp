@@ -1,0 +1,40 @@
+#include "sckf_odometry/matching/line_fit.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sckf {
+
+LineFits::LineFits(const std::vector<Eigen::Vector2d>& points) : sums_(points.size() + 1, Sums::Zero()) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector2d& p = points[i];
+    sums_[i + 1] = sums_[i];
+    sums_[i + 1] += (Sums() << p.x(), p.y(), p.x() * p.x(), p.x() * p.y(), p.y() * p.y()).finished();
+  }
+}
+
+LineFits::Fit LineFits::fit(int first, int last) const {
+  const double n = last - first + 1;
+  const Sums s = sums_[static_cast<std::size_t>(last) + 1] - sums_[static_cast<std::size_t>(first)];
+  const Eigen::Vector2d c = s.head<2>() / n;
+  const double xx = s(2) - n * c.x() * c.x();
+  const double xy = s(3) - n * c.x() * c.y();
+  const double yy = s(4) - n * c.y() * c.y();
+  const double half_spread = std::hypot(0.5 * (xx - yy), xy);
+  const double direction = 0.5 * std::atan2(xy, 0.5 * (xx - yy));
+  const double across = std::max(0.0, 0.5 * (xx + yy) - half_spread);
+  const Eigen::Vector2d normal(-std::sin(direction), std::cos(direction));
+  return {{c, normal, first, last, 2.0 * half_spread}, std::sqrt(across / std::max(1.0, n - 2.0))};
+}
+
+bool connected(const ScannedPoints& points, std::size_t i, double range_noise, double angle_increment) {
+  constexpr double kGrazing = 8.0 * M_PI / 180.0;
+  constexpr int kMaxBeams = 3;
+  const int beams = points.beam[i + 1] - points.beam[i];
+  const double step = beams * std::abs(angle_increment);
+  if (beams > kMaxBeams || step >= kGrazing) return false;
+  const double reach = points.range[i] * std::sin(step) / std::sin(kGrazing - step);
+  return (points.point[i + 1] - points.point[i]).norm() <= reach + 3.0 * range_noise;
+}
+
+}  // namespace sckf
