@@ -79,6 +79,8 @@ void switchOthersOn(PipelineOptions& options, Bytes& bytes) {
   options.imu.orientation = can && bytes.chance();
   options.pose_updates.on = can && bytes.chance();
   options.standstill.time = can ? 0.2 * bytes.upTo(2) : 0.0;
+  const auto use = static_cast<std::size_t>(bytes.upTo(2));
+  options.landmarks.use = can && !options.pose_updates.on ? landmarkUses()[use] : "none";
 }
 
 PipelineOptions options(Bytes& bytes) {
@@ -93,8 +95,6 @@ PipelineOptions options(Bytes& bytes) {
   options.gate.trust_scans_on_slip = bytes.chance();
   options.deskew = bytes.chance();
   options.odometry_noise.model = odometryModelNames()[static_cast<std::size_t>(bytes.upTo(2))];
-  const auto use = static_cast<std::size_t>(bytes.upTo(2));
-  if (options.method == "sckf_multi") options.landmarks.use = landmarkUses()[use];
   options.landmarks.max = 1 + bytes.upTo(9);
   options.scan.max_beams = bytes.chance() ? 60 : 400;
   switchOthersOn(options, bytes);
@@ -311,7 +311,6 @@ class Driver {
     PipelineOptions changed = options(bytes_);
     changed.method = pipeline_.options().method;
     switchOthersOn(changed, bytes_);
-    if (changed.method != "sckf_multi") changed.landmarks.use = "none";
     pipeline_.setOptions(changed);
   }
 

@@ -292,7 +292,7 @@ void ScanOdometry::useLandmarks(ScanReport& report) {
   report.landmarks = landmarks_.views(*filter);
   if (options_.landmarks.withDisplacements() || report.new_reference) return;
   report.outcome = report.landmarks_used > 0 ? ScanOutcome::kUpdated : ScanOutcome::kNoMatch;
-  if (report.landmarks_used == 0) report.reason = "no landmark seen, and displacements are not used";
+  if (report.landmarks_used == 0) report.reason = "no landmark seen; displacements are not used";
 }
 
 double ScanOdometry::gate(const Displacement& displacement) const {
