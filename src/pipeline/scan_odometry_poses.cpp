@@ -18,8 +18,9 @@ bool isPose(const PoseUpdate& pose) {
   const PoseMeasurement& z = pose.map_from_base;
   const bool finite = isTime(pose.stamp) && z.pose.vector().allFinite() && z.covariance.allFinite();
   if (!finite || z.pose.vector().cwiseAbs().maxCoeff() > kLargest) return false;
-  return z.covariance.cwiseAbs().maxCoeff() <= kLargest && isCovariance(z.covariance) &&
-         z.covariance.llt().rcond() > 1e-12;
+  if (z.covariance.cwiseAbs().maxCoeff() > kLargest || !isCovariance(z.covariance)) return false;
+  const Eigen::LLT<Eigen::Matrix3d> factor(z.covariance);
+  return factor.info() == Eigen::Success && factor.rcond() > 1e-12;
 }
 
 }  // namespace
