@@ -1,6 +1,8 @@
 #include "sckf_odometry/core/covariance.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <sstream>
 
 namespace sckf {
 
@@ -11,6 +13,26 @@ bool isCovariance(const Eigen::Matrix3d& P) {
   if ((P - P.transpose()).cwiseAbs().maxCoeff() > kTolerance * scale) return false;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(P, Eigen::EigenvaluesOnly);
   return eigen.eigenvalues().minCoeff() >= -kTolerance * scale;
+}
+
+bool isPositiveDefinite(const Eigen::Matrix3d& P) {
+  if (!isCovariance(P)) return false;
+  const Eigen::LLT<Eigen::Matrix3d> factor(P);
+  return factor.info() == Eigen::Success && factor.rcond() > 1e-12;
+}
+
+std::string problemOf(const SE2& pose, const Eigen::Matrix3d& covariance) {
+  constexpr double kLargest = 1e9;  // beyond, doubles tell centimetres no more
+  const Eigen::IOFormat in_a_row(Eigen::StreamPrecision, Eigen::DontAlignCols, ", ", "; ");
+  const Eigen::Vector3d values = pose.vector();
+  std::ostringstream problem;
+  if (!values.allFinite() || values.cwiseAbs().maxCoeff() > kLargest) {
+    problem << "pose is (" << values.transpose().format(in_a_row) << "): expected finite values up to " << kLargest;
+  } else if (!isCovariance(covariance) || covariance.cwiseAbs().maxCoeff() > kLargest) {
+    problem << "covariance of the pose is [" << covariance.format(in_a_row)
+            << "]: expected a symmetric, positive semi-definite matrix of finite values up to " << kLargest;
+  }
+  return problem.str();
 }
 
 }  // namespace sckf

@@ -121,13 +121,9 @@ void MultiCloneFilter::measureMotion(const OdometryIncrement& increment, const M
   errors_.move(pose_error_, W, noise_error);
   Vector3d noise = Vector3d::Zero();
   std::vector<Part> parts = statesNotCloned();
+  parts.push_back(noise_error);
   for (const MotionMeasurement& z : increment.measured) {
-    const Measurement m = measurement(z, noise, noise_error);
-    noise += errors_.correlate(m).gain(noise_error) * m.residual;
-    // The noise is one of those that are corrected, by which its covariance shrinks.
-    parts.push_back(noise_error);
-    correct(m, parts);
-    parts.pop_back();
+    noise += correct(measurement(z, noise, noise_error), parts).back();
   }
   errors_.remove(noise_error);
 }
@@ -307,8 +303,8 @@ std::vector<ErrorState::Part> MultiCloneFilter::allStates() const {
   return parts;
 }
 
-void MultiCloneFilter::correct(const Measurement& measurement, const std::vector<Part>& parts) {
-  const std::vector<Eigen::VectorXd> corrections = errors_.update(measurement, parts);
+std::vector<Eigen::VectorXd> MultiCloneFilter::correct(const Measurement& measurement, const std::vector<Part>& parts) {
+  std::vector<Eigen::VectorXd> corrections = errors_.update(measurement, parts);
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const Eigen::VectorXd& c = corrections[i];
     const auto is = [&](const std::optional<Part>& part) { return part && part->row == parts[i].row; };
@@ -323,6 +319,7 @@ void MultiCloneFilter::correct(const Measurement& measurement, const std::vector
       if (is(landmark.error)) landmark.pose = compose(exponential(c), landmark.pose);
     }
   }
+  return corrections;
 }
 
 }  // namespace sckf

@@ -4,13 +4,6 @@
 
 namespace sckf {
 
-namespace {
-
-/// 𝒥 p = [0 −1; 1 0] p: p turned by a quarter, the derivative of C(φ) p with respect to φ at φ = 0.
-Eigen::Vector2d quarterTurn(const Eigen::Vector2d& p) { return {-p.y(), p.x()}; }
-
-}  // namespace
-
 double wrapAngle(double angle) {
   const double wrapped = std::remainder(angle, 2.0 * M_PI);
   return wrapped <= -M_PI ? M_PI : wrapped;

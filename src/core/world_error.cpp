@@ -9,9 +9,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// 𝒥 p: p turned by a quarter.
-Eigen::Vector2d quarterTurn(const Eigen::Vector2d& p) { return {-p.y(), p.x()}; }
-
 /// Length of a chord over that of its arc of 2 half radians.
 double chord(double half) { return std::abs(half) < 1e-9 ? 1.0 : std::sin(half) / half; }
 

@@ -38,6 +38,7 @@ void checkStates(const PipelineOptions& options) {
   if (options.imu.orientation) refuse("use_imu_orientation is true", "false");
   if (options.pose_updates.on) refuse("use_pose_updates is true", "false");
   if (options.standstill.time > 0.0) refuse("standstill_time is " + std::to_string(options.standstill.time), "0");
+  if (options.landmarks.on()) refuse("landmarks is \"" + options.landmarks.use + "\"", "\"none\"");
 }
 
 void checkLasers(const PipelineOptions& options) {
@@ -47,28 +48,14 @@ void checkLasers(const PipelineOptions& options) {
 }
 
 void checkLandmarks(const PipelineOptions& options) {
-  if (!options.landmarks.on()) return;
-  if (options.pose_updates.on) {
-    throw std::invalid_argument("landmarks is \"" + options.landmarks.use +
-                                "\": expected \"none\" with use_pose_updates: the estimate in map has none");
-  }
-  if (options.method == "sckf_multi") return;
-  throw std::invalid_argument("landmarks is \"" + options.landmarks.use + "\": expected \"none\" with method \"" +
-                              options.method + "\"; only \"sckf_multi\" has states beside the pose");
+  if (!options.landmarks.on() || !options.pose_updates.on) return;
+  throw std::invalid_argument("landmarks is \"" + options.landmarks.use +
+                              "\": expected \"none\" with use_pose_updates: the estimate in map has none");
 }
 
 void checkPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance) {
-  constexpr double kLargest = 1e9;  // beyond, doubles tell centimetres no more
-  const Eigen::Vector3d pose = odom_from_base.vector();
-  const Eigen::IOFormat in_a_row(Eigen::StreamPrecision, Eigen::DontAlignCols, ", ", "; ");
-  std::ostringstream problem;
-  if (!pose.allFinite() || pose.cwiseAbs().maxCoeff() > kLargest) {
-    problem << "pose is (" << pose.transpose().format(in_a_row) << "): expected finite values up to " << kLargest;
-  } else if (!isCovariance(covariance) || covariance.cwiseAbs().maxCoeff() > kLargest) {
-    problem << "covariance of the pose is [" << covariance.format(in_a_row)
-            << "]: expected a symmetric, positive semi-definite matrix of finite values up to " << kLargest;
-  }
-  if (!problem.str().empty()) throw std::invalid_argument(problem.str());
+  const std::string problem = problemOf(odom_from_base, covariance);
+  if (!problem.empty()) throw std::invalid_argument(problem);
 }
 
 std::string describe(const Innovation& innovation, double bound) {

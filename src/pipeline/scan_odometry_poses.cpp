@@ -1,5 +1,4 @@
 // What ScanOdometry does with absolute poses.
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <sstream>
 #include <utility>
@@ -10,23 +9,9 @@
 
 namespace sckf {
 
-namespace {
-
-constexpr double kLargest = 1e9;  // beyond, doubles tell centimetres no more
-
-bool isPose(const PoseUpdate& pose) {
-  const PoseMeasurement& z = pose.map_from_base;
-  const bool finite = isTime(pose.stamp) && z.pose.vector().allFinite() && z.covariance.allFinite();
-  if (!finite || z.pose.vector().cwiseAbs().maxCoeff() > kLargest) return false;
-  if (z.covariance.cwiseAbs().maxCoeff() > kLargest || !isCovariance(z.covariance)) return false;
-  const Eigen::LLT<Eigen::Matrix3d> factor(z.covariance);
-  return factor.info() == Eigen::Success && factor.rcond() > 1e-12;
-}
-
-}  // namespace
-
 void ScanOdometry::addPose(const PoseUpdate& pose) {
-  if (!isPose(pose)) {
+  const PoseMeasurement& z = pose.map_from_base;
+  if (!isTime(pose.stamp) || !problemOf(z.pose, z.covariance).empty() || !isPositiveDefinite(z.covariance)) {
     const char* const expected = "finite numbers and a positive definite covariance expected";
     pose_reports_.push_back(notUsed(pose.stamp, PoseOutcome::kNoPose, expected));
   } else if (const auto given_up = waiting_poses_.add(pose)) {

@@ -1,20 +1,11 @@
 #include "sckf_odometry/ros/pose_update_input.h"
 
-#include <Eigen/Cholesky>
 #include <sstream>
 
+#include "sckf_odometry/core/covariance.h"
 #include "sckf_odometry/ros/conversions.h"
 
 namespace sckf {
-
-namespace {
-
-bool isPositiveDefinite(const Eigen::Matrix3d& covariance) {
-  const Eigen::LLT<Eigen::Matrix3d> factor(covariance);
-  return factor.info() == Eigen::Success && factor.rcond() > 1e-12;
-}
-
-}  // namespace
 
 PoseUpdateInput::PoseUpdateInput(const NodeOptions& options, const std::string& topic, Health& health,
                                  Warnings& warnings)

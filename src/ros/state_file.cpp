@@ -37,8 +37,8 @@ SavedPose parse(const YAML::Node& root) {
   saved.odom_from_base = SE2(pose[0], pose[1], pose[2]);
   const std::vector<double> covariance = numbers(root["covariance"], 9);
   saved.covariance = Eigen::Map<const Eigen::Matrix3d>(covariance.data());
-  if (!saved.odom_from_base.vector().allFinite()) throw std::runtime_error("the pose is not finite");
-  if (!isCovariance(saved.covariance)) throw std::runtime_error("the covariance is none");
+  const std::string problem = problemOf(saved.odom_from_base, saved.covariance);
+  if (!problem.empty()) throw std::runtime_error(problem);
   return saved;
 }
 

@@ -79,7 +79,9 @@ TEST_F(StateFileTest, NumbersThatAreNoPoseAreRefused) {
   fill(frames + "pose: [1, 2, 3]\n" + zeros);
   EXPECT_EQ(refusal(), "read");
   fill(frames + "pose: [.nan, 2, 3]\n" + zeros);
-  EXPECT_TRUE(contains(refusal(), "not finite"));
+  EXPECT_TRUE(contains(refusal(), "pose is (nan, 2, 3): expected finite values"));
+  fill(frames + "pose: [1e300, 2, 3]\n" + zeros);
+  EXPECT_TRUE(contains(refusal(), "pose is (1e+300, 2, 3): expected finite values"));
   fill(frames + "pose: [1, 2]\n" + zeros);
   EXPECT_TRUE(contains(refusal(), "3 numbers"));
   fill(frames + "pose: [1, 2, 3]\ncovariance: [-1, 0, 0, 0, 1, 0, 0, 0, 1]\n");

@@ -1,12 +1,21 @@
-// What every covariance must be.
+// What every covariance must be, and every estimate of a pose.
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
+
+#include "sckf_odometry/core/se2.h"
 
 namespace sckf {
 
 /// Whether a matrix is finite, symmetric and positive semi-definite, to rounding. Zero is.
 bool isCovariance(const Eigen::Matrix3d& P);
+
+/// Whether it is a covariance of which nothing is known exactly, so that it has an inverse.
+bool isPositiveDefinite(const Eigen::Matrix3d& P);
+
+/// What is wrong with a pose and its covariance as an estimate, what was expected; empty if nothing is.
+std::string problemOf(const SE2& pose, const Eigen::Matrix3d& covariance);
 
 /// The symmetric part: rounding must not make a covariance drift from symmetry.
 template <typename Derived>

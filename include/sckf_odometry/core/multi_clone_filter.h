@@ -95,7 +95,8 @@ class MultiCloneFilter : public FusionMethod {
 
   std::vector<Part> statesNotCloned() const;
   std::vector<Part> allStates() const;
-  void correct(const Measurement& measurement, const std::vector<Part>& parts);
+  /// Returns by what, part for part.
+  std::vector<Eigen::VectorXd> correct(const Measurement& measurement, const std::vector<Part>& parts);
 
   StateOptions options_;
   ErrorState errors_;

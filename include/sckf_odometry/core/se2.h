@@ -28,6 +28,9 @@ struct SE2 {
   Eigen::Vector2d operator*(const Eigen::Vector2d& point) const { return rotation() * point + translation(); }
 };
 
+/// 𝒥 p = [0 −1; 1 0] p: p turned by a quarter, the derivative of C(φ) p by φ at φ = 0.
+inline Eigen::Vector2d quarterTurn(const Eigen::Vector2d& p) { return {-p.y(), p.x()}; }
+
 /// a ⊕ b: the pose whose coordinates in frame a are b. Jacobians (3 × 3) are of the additive error, see above.
 SE2 compose(const SE2& a, const SE2& b, Eigen::Matrix3d* J_out_a = nullptr, Eigen::Matrix3d* J_out_b = nullptr);
 

@@ -4,10 +4,9 @@
 #include <Eigen/Core>
 #include <vector>
 
-namespace sckf {
+#include "sckf_odometry/core/se2.h"
 
-/// p turned by a quarter, counter-clockwise: the derivative of a rotated point by the angle.
-inline Eigen::Vector2d quarterTurn(const Eigen::Vector2d& p) { return {-p.y(), p.x()}; }
+namespace sckf {
 
 struct SurfaceOptions {
   double straightness = 1.7;     ///< a surface is straight while its points scatter by this many std of a range
