@@ -7,6 +7,7 @@ from typing import Callable, Dict
 from experiment_base import (GREEN, GREY, WITH, WITHOUT, Result, Setting, markdown_table, new_figure, paragraph,
                              read_table, save_figure, simulate)
 from experiment_landmarks import landmarks
+from experiment_references import references
 
 
 def deskewing(setting: Setting) -> Result:
@@ -93,7 +94,7 @@ def odometry_models(setting: Setting) -> Result:
 
 
 SECTIONS: Dict[str, Callable[[Setting], Result]] = {
-    "landmarks": landmarks,
+    "references": references, "landmarks": landmarks,
     "deskewing": deskewing, "cloud_input": cloud_input, "odometry_models": odometry_models}
 
 

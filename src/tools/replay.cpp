@@ -133,6 +133,8 @@ class Statistics {
     ++outcomes_[report.outcome];
     ++deskewing_[report.deskewing];
     times_.push_back(time);
+    if (report.new_reference) reference_times_.push_back(time);
+    older_references_ += static_cast<std::size_t>(report.older_references);
     landmarks_used_ += static_cast<std::size_t>(report.landmarks_used);
     most_landmarks_ = std::max(most_landmarks_, report.landmarks.size());
   }
@@ -148,22 +150,33 @@ class Statistics {
     if (most_landmarks_ > 0) {
       std::printf("landmarks seen %zu times, at most %zu in the state\n", landmarks_used_, most_landmarks_);
     }
-    std::sort(times_.begin(), times_.end());
-    std::printf("time of a scan: median %.3f ms, 95 %% below %.3f ms, longest %.3f ms\n", 1e3 * quantile(0.5),
-                1e3 * quantile(0.95), 1e3 * times_.back());
+    if (older_references_ > 0) {
+      std::printf("older references used %zu times, by %zu scans that became one\n", older_references_,
+                  reference_times_.size());
+    }
+    printTimes("time of a scan", times_);
+    printTimes("time of a scan that became a reference", reference_times_);
     std::printf("%.1f s of log in %.2f s: %.0f times real time\n", log_duration, wall_time, log_duration / wall_time);
   }
 
  private:
-  double quantile(double q) const {
-    return times_[static_cast<std::size_t>(q * static_cast<double>(times_.size() - 1))];
+  static void printTimes(const char* what, std::vector<double>& times) {
+    if (times.empty()) return;
+    std::sort(times.begin(), times.end());
+    const auto quantile = [&times](double q) {
+      return 1e3 * times[static_cast<std::size_t>(q * static_cast<double>(times.size() - 1))];
+    };
+    std::printf("%s: median %.3f ms, 95 %% below %.3f ms, longest %.3f ms\n", what, quantile(0.5), quantile(0.95),
+                quantile(1.0));
   }
 
   std::map<ScanOutcome, std::size_t> outcomes_;
   std::map<Deskewing, std::size_t> deskewing_;
+  std::size_t older_references_ = 0;
   std::size_t landmarks_used_ = 0;
   std::size_t most_landmarks_ = 0;
-  std::vector<double> times_;
+  std::vector<double> times_;            // [s] of each scan …
+  std::vector<double> reference_times_;  // [s] … and of those that became a reference
 };
 
 class Replay {

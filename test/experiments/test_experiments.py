@@ -30,7 +30,7 @@ RUNS = 20
 FIGURES = ("four_methods", "four_methods_covariance", "line_matching", "line_matching_nees", "line_matching_ratios",
            "displacement_only", "displacement_only_covariance", "one_dimension", "visual_odometry", "complexity",
            "extensions_deskewing", "extensions_cloud_input", "extensions_odometry_models",
-           "extensions_landmarks")
+           "extensions_landmarks", "extensions_references")
 
 
 def experiment(arguments: List[str], **options: object) -> subprocess.CompletedProcess:
@@ -145,6 +145,19 @@ class AllExperiments(unittest.TestCase):
                            "an error of its way is one of its yaw")
         self.assertLess(nees["differential", "ackermann"], 0.1, "it turns on the spot, and is not believed")
 
+
+    def test_more_references_drift_less_and_cost_what_their_matches_cost(self) -> None:
+        n = {poses: {key: self.numbers("extensions")[f"references_{poses}_{key}"]
+                     for key in ("drift_percent", "drift_deg_per_m", "older", "time_ratio")} for poses in (2, 3, 4, 5, 8)}
+        for fewer, more in ((2, 4), (4, 8)):
+            self.assertLess(n[more]["drift_percent"], 0.9 * n[fewer]["drift_percent"], n)
+            self.assertLess(n[more]["drift_deg_per_m"], 0.9 * n[fewer]["drift_deg_per_m"], n)
+        self.assertEqual(n[2]["older"], 0.0)
+        for poses in (3, 4, 5, 8):
+            self.assertLessEqual(n[poses]["older"], poses - 2)
+        self.assertGreater(n[8]["older"], n[3]["older"] + 0.5)
+        self.assertGreater(n[8]["time_ratio"], 1.3, "it matches with more, and is not quicker")
+        self.assertLess(n[8]["time_ratio"], 1.6 * (1.0 + n[8]["older"]), "a match costs about what the first one does")
 
     def test_landmarks_beside_displacements_do_no_harm(self) -> None:
         n = self.numbers("extensions")

@@ -146,6 +146,8 @@ class ReplayTest(unittest.TestCase):
         said = self.replay(self.bag, "--csv", self.path("any.csv"))
         self.assertRegex(said, rf"(?m)^{scans} scans, 1 reference, {scans - 1} updated$")
         self.assertRegex(said, r"time of a scan: median [0-9.]+ ms")
+        self.assertRegex(said, r"older references used [1-9][0-9]* times, by [1-9][0-9]* scans that became one")
+        self.assertRegex(said, r"time of a scan that became a reference: median [0-9.]+ ms")
         self.assertRegex(said, r"[0-9]+ times real time")
 
     # ---- options
