@@ -5,6 +5,7 @@
 #include <chrono>
 #include <limits>
 
+#include "sckf_odometry/core/multi_clone_filter.h"
 #include "sckf_odometry/core/stochastic_cloning_filter.h"
 #include "sckf_odometry/experiments/random_draws.h"
 
@@ -70,6 +71,35 @@ double timeDense(const Displacement& z, RandomDraws& random) {
   return fastest([] {}, [&] { denseUpdate(H, z.matching_noise, P); });
 }
 
+/// With everything correlated with everything.
+MultiCloneFilter filterOf(const StateSize& size, const Displacement& z, RandomDraws& random) {
+  MultiCloneFilter filter(SE2(), 0.01 * Eigen::Matrix3d::Identity());
+  for (int clone = 0; clone < size.clones; ++clone) {
+    if (clone > 0) {
+      filter.propagate(kMoved);
+      filter.update(z, filter.innovation(z));
+    }
+    filter.clone(z.variance_current);
+  }
+  for (int landmark = 0; landmark < size.landmarks; ++landmark) {
+    const SE2 place(random.uniform(-5.0, 5.0), random.uniform(-5.0, 5.0), random.uniform(-3.0, 3.0));
+    filter.addLandmark({place, 1e-3 * Eigen::Matrix3d::Identity()});
+  }
+  return filter;
+}
+
+double timeUpdate(const StateSize& size, RandomDraws& random) {
+  Displacement z = someDisplacement(size.ranges, random);
+  MultiCloneFilter filter = filterOf(size, z, random);
+  z.clone = static_cast<std::size_t>(size.clones) - 1;
+  return fastest(
+      [&] {
+        filter.propagate(kMoved);
+        z.reference_from_current = filter.predictedDisplacementFrom(z.clone).reference_from_current;
+      },
+      [&] { filter.update(z, filter.innovation(z)); });
+}
+
 }  // namespace
 
 void denseUpdate(const Eigen::MatrixXd& H, const Eigen::MatrixXd& noise, Eigen::MatrixXd& P) {
@@ -92,6 +122,16 @@ std::vector<UpdateTimes> measureUpdates(const std::vector<int>& ranges, int max_
     t.sckf_nc = timeFilter(withoutRanges(z), Correlations::kIgnored);
     if (m <= max_dense_ranges) t.dense = timeDense(z, random);
     times.push_back(t);
+    tick();
+  }
+  return times;
+}
+
+std::vector<double> measureUpdates(const std::vector<StateSize>& sizes, const std::function<void()>& tick) {
+  std::vector<double> times;
+  RandomDraws random(1);
+  for (const StateSize& size : sizes) {
+    times.push_back(timeUpdate(size, random));
     tick();
   }
   return times;

@@ -29,6 +29,11 @@ Path swinging(double yaw_rate) {
 
 RunErrors follow(const Path& world_from_base, const Sensor& sensor, const PipelineOptions& pipeline,
                  const RunOptions& options) {
+  return follow(world_from_base, std::vector<RatedSensor>{{sensor, options.scan_rate}}, pipeline, options);
+}
+
+RunErrors follow(const Path& world_from_base, const std::vector<RatedSensor>& sensors, const PipelineOptions& pipeline,
+                 const RunOptions& options) {
   ScanOdometry odometry(pipeline);
   RunErrors errors;
   const auto account = [&](const ScanReport& report) {
@@ -39,10 +44,11 @@ RunErrors follow(const Path& world_from_base, const Sensor& sensor, const Pipeli
     errors.yaw += e.z() * e.z();
     ++errors.scans;
     errors.used += wasUsed(report.outcome) ? 1 : 0;
+    options.watch(t, report);
   };
   OdometrySample wheels;
   const double step = 1.0 / options.odometry_rate;
-  double next_scan = 0.37 * step;  // between two samples
+  std::vector<double> next_scan(sensors.size(), 0.37 * step);  // between two samples
   for (int i = 0; i * step <= options.duration; ++i) {
     const double t = i * step;
     wheels.stamp = stampAt(t);
@@ -51,10 +57,13 @@ RunErrors follow(const Path& world_from_base, const Sensor& sensor, const Pipeli
       wheels.odom_from_base = compose(wheels.odom_from_base, told(motion, options));
     }
     odometry.addOdometry(wheels);
-    for (; next_scan < t; next_scan += 1.0 / options.scan_rate) {
-      MountedScan mounted = sensor(next_scan);
-      mounted.scan.stamp = stampAt(next_scan);
-      odometry.addScan(mounted.scan, mounted.base_from_laser);
+    options.others(t, odometry);
+    for (std::size_t laser = 0; laser < sensors.size(); ++laser) {
+      for (double& at = next_scan[laser]; at < t; at += 1.0 / sensors[laser].rate) {
+        MountedScan mounted = sensors[laser].sensor(at);
+        mounted.scan.stamp = stampAt(at);
+        odometry.addScan(mounted.scan, mounted.base_from_laser, laser);
+      }
     }
     for (const ScanReport& report : odometry.process()) account(report);
   }

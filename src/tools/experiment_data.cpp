@@ -1,4 +1,4 @@
-// The simulations of the paper's experiments, as tables: what the script `experiment` draws.
+// The simulations of the paper's experiments and of the extensions, as tables: what the script `experiment` draws.
 #include <algorithm>
 #include <boost/program_options.hpp>
 #include <cmath>
@@ -7,35 +7,14 @@
 #include <iostream>
 #include <map>
 
-#include "sckf_odometry/experiments/cloud_input.h"
 #include "sckf_odometry/experiments/complexity.h"
 #include "sckf_odometry/experiments/csv_file.h"
-#include "sckf_odometry/experiments/deskewing.h"
-#include "sckf_odometry/experiments/line_matching.h"
-#include "sckf_odometry/experiments/odometry_models.h"
-#include "sckf_odometry/experiments/one_dimension.h"
-#include "sckf_odometry/experiments/visual_odometry.h"
+#include "sckf_odometry/tools/experiment_arguments.h"
 #include "sckf_odometry/tools/progress_bar.h"
 
 namespace sckf {
 
 namespace {
-
-/// Every experiment has its options; of the command line it takes those that are its own.
-struct Arguments {
-  std::string name;
-  std::string output = ".";
-  int runs = 0;  // 0: as the experiment has it
-  std::uint64_t seed = 1;
-  OneDimensionOptions one_dimension;
-  LineMatchingOptions line_matching;
-  VisualOdometryOptions visual_odometry;
-  DeskewingOptions deskewing;
-  CloudInputOptions cloud_input;
-  OdometryModelsOptions odometry_models;
-
-  std::string file(const std::string& table) const { return output + "/" + table + ".csv"; }
-};
 
 std::vector<double> logSpaced(double low, double high, int count) {
   std::vector<double> values;
@@ -150,45 +129,15 @@ void complexity(const Arguments& arguments) {
   for (const UpdateTimes& t : times) table.row({static_cast<double>(t.ranges), t.sckf, t.sckf_nc, t.dense});
 }
 
-void deskewing(const Arguments& arguments) {
-  const std::vector<double> yaw_rates{0.0, 0.5, 1.0, 1.5, 2.0};
-  ProgressBar progress(yaw_rates.size());
-  const auto points = simulateDeskewing(arguments.deskewing, yaw_rates, [&progress] { progress.advance(); });
-  progress.finish();
-  CsvFile table(arguments.file("deskewing"), "yaw_rate,sweep,with_position,with_yaw,without_position,without_yaw");
-  for (const DeskewingPoint& p : points) {
-    table.row({p.yaw_rate, arguments.deskewing.sweep, p.with.position, p.with.yaw, p.without.position, p.without.yaw});
-  }
-}
-
-void cloudInput(const Arguments& arguments) {
-  const std::vector<int> beams{90, 180, 360, 720, 1440};
-  ProgressBar progress(beams.size() + 2);
-  const auto rows = simulateCloudInput(arguments.cloud_input, beams, [&progress] { progress.advance(); });
-  progress.finish();
-  CsvFile table(arguments.file("cloud_input"), "input,beams,position,yaw,scans,used");
-  for (const CloudInputRow& row : rows) {
-    table.row(row.input, {static_cast<double>(row.beams), row.errors.position, row.errors.yaw,
-                          static_cast<double>(row.errors.scans), static_cast<double>(row.errors.used)});
-  }
-}
-
-void odometryModels(const Arguments& arguments) {
-  ProgressBar progress(odometryModelNames().size() * odometryModelNames().size());
-  const auto rows = simulateOdometryModels(arguments.odometry_models, [&progress] { progress.advance(); });
-  progress.finish();
-  CsvFile table(arguments.file("odometry_models"), "robot,model,nees,largest_std,smallest_std,runs");
-  for (const OdometryModelsRow& row : rows) {
-    table.row(row.robot + "," + row.model,
-              {row.nees, row.largest_std, row.smallest_std, static_cast<double>(arguments.odometry_models.runs)});
-  }
-}
-
-const std::map<std::string, std::function<void(const Arguments&)>>& experiments() {
-  static const std::map<std::string, std::function<void(const Arguments&)>> all{
-      {"one_dimension", oneDimension},    {"line_matching", lineMatching}, {"visual_odometry", visualOdometry},
-      {"complexity", complexity},         {"deskewing", deskewing},        {"cloud_input", cloudInput},
-      {"odometry_models", odometryModels}};
+const Experiments& experiments() {
+  static const Experiments all = [] {
+    Experiments of_the_paper{{"one_dimension", oneDimension},
+                             {"line_matching", lineMatching},
+                             {"visual_odometry", visualOdometry},
+                             {"complexity", complexity}};
+    of_the_paper.insert(extensions().begin(), extensions().end());
+    return of_the_paper;
+  }();
   return all;
 }
 
@@ -199,7 +148,7 @@ boost::program_options::options_description optionsFor(Arguments& a) {
   // clang-format off
   shown.add_options()("help,h", "show this help")
     ("output", value(&a.output), "folder for the tables")
-    ("runs", value(&a.runs), "of the Monte Carlo simulation; 0: 400, 200 and 40 of the first three below, 400 of odometry_models")
+    ("runs", value(&a.runs), "of the Monte Carlo simulation; 0: 400, 200 and 40 of the first three below, 400 of odometry_models, 200 of the other extensions")
     ("seed", value(&a.seed), "of the random numbers");
   po::options_description one("one_dimension");
   one.add_options()("density", value(&a.one_dimension.density), "features per metre")
@@ -238,18 +187,21 @@ bool parse(int argc, char** argv, Arguments& arguments) {
   if (values.count("help") != 0) {
     std::cout << "usage: experiment_data NAME --output DIR [options]\n\nNAME:";
     for (const auto& [name, experiment] : experiments()) std::cout << " " << name;
-    std::cout << "\n\nSimulates an experiment of the paper and writes its numbers.\n\n" << shown;
+    std::cout << "\n\nSimulates an experiment of the paper, or of what goes beyond it, and writes its numbers.\n\n"
+              << shown;
     return false;
   }
   if (experiments().count(arguments.name) == 0) throw po::error("there is no experiment of that name; see --help");
   if (arguments.runs < 0) throw po::error("--runs must not be negative");
   if (arguments.runs > 0) {
     arguments.one_dimension.runs = arguments.line_matching.runs = arguments.visual_odometry.runs = arguments.runs;
-    arguments.odometry_models.runs = arguments.runs;
+    arguments.odometry_models.runs = arguments.several_lasers.runs = arguments.other_measurements.runs = arguments.runs;
   }
   if (arguments.cloud_input.rings < 2) throw po::error("--rings must be 2 at least");
   arguments.one_dimension.seed = arguments.line_matching.seed = arguments.visual_odometry.seed = arguments.seed;
   arguments.deskewing.seed = arguments.cloud_input.seed = arguments.odometry_models.seed = arguments.seed;
+  arguments.several_lasers.seed = arguments.mounted_lasers.seed = arguments.seed;
+  arguments.other_measurements.seed = arguments.absolute_poses.seed = arguments.seed;
   return true;
 }
 

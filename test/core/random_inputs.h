@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <cmath>
 #include <cstdint>
@@ -10,26 +9,20 @@
 
 #include "sckf_odometry/core/displacement.h"
 #include "sckf_odometry/core/fusion_method.h"
+#include "sckf_odometry/experiments/random_draws.h"
 
 namespace sckf {
 
-class RandomInputs {
+class RandomInputs : public RandomDraws {
  public:
-  explicit RandomInputs(std::uint64_t seed) : engine_(seed) {}
+  using RandomDraws::gaussian;
+  using RandomDraws::RandomDraws;
 
-  double uniform(double low, double high) { return std::uniform_real_distribution<>(low, high)(engine_); }
   int integer(int low, int high) { return std::uniform_int_distribution<>(low, high)(engine_); }  // both inclusive
   double magnitude(double low, double high) { return std::exp(uniform(std::log(low), std::log(high))); }
 
-  Eigen::MatrixXd gaussian(Eigen::Index rows, Eigen::Index cols = 1) {
-    return Eigen::MatrixXd::NullaryExpr(rows, cols, [this] { return normal_(engine_); });
-  }
-
-  /// A draw from N(0, P). P may be singular.
-  Eigen::VectorXd drawnFrom(const Eigen::MatrixXd& P) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(P);
-    const Eigen::VectorXd std_devs = eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-    return eigen.eigenvectors() * std_devs.cwiseProduct(gaussian(P.rows()));
+  Eigen::MatrixXd gaussian(Eigen::Index rows, Eigen::Index cols) {
+    return Eigen::MatrixXd::NullaryExpr(rows, cols, [this] { return RandomDraws::gaussian(); });
   }
 
   SE2 pose(double extent) { return {uniform(-extent, extent), uniform(-extent, extent), uniform(-M_PI, M_PI)}; }
@@ -63,10 +56,6 @@ class RandomInputs {
   Eigen::VectorXd rangeVariances(int ranges, double low_std, double high_std) {
     return Eigen::VectorXd::NullaryExpr(ranges, [&] { return std::pow(magnitude(low_std, high_std), 2); });
   }
-
- private:
-  std::mt19937_64 engine_;
-  std::normal_distribution<> normal_;
 };
 
 }  // namespace sckf

@@ -12,9 +12,10 @@
 #include <vector>
 
 #include "chi_squared_band.h"
-#include "room_simulation.h"
+#include "random_inputs.h"
 #include "sckf_odometry/core/fusion_method.h"
 #include "sckf_odometry/core/odometry_model.h"
+#include "sckf_odometry/experiments/room_simulation.h"
 
 namespace sckf {
 namespace {
@@ -27,7 +28,7 @@ const std::vector<int> kCheckedScans{10, 20, 30, 40, 50, 60};
 /// A place to drive through, and the way through it.
 struct World {
   const char* name;
-  std::vector<Wall> walls;
+  std::vector<StraightWall> walls;
   int directions;  // that a displacement sees
   SE2 start;       // odom_from_base
   double wave;     // share of the turning that swings left and right rather than going on, 0 to 1

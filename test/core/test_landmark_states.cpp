@@ -10,9 +10,10 @@
 #include <vector>
 
 #include "matrix_matchers.h"
-#include "room_simulation.h"
+#include "random_inputs.h"
 #include "sckf_odometry/core/multi_clone_filter.h"
 #include "sckf_odometry/core/odometry_model.h"
+#include "sckf_odometry/experiments/room_simulation.h"
 
 namespace sckf {
 namespace {

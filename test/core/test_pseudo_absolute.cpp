@@ -7,10 +7,10 @@
 
 #include "matrix_matchers.h"
 #include "random_inputs.h"
-#include "room_simulation.h"
 #include "sckf_odometry/core/covariance_intersection.h"
 #include "sckf_odometry/core/odometry_model.h"
 #include "sckf_odometry/core/pseudo_absolute.h"
+#include "sckf_odometry/experiments/room_simulation.h"
 
 namespace sckf {
 namespace {

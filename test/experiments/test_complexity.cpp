@@ -51,5 +51,19 @@ TEST(Complexity, IsLinearForTheScKf) {
   EXPECT_EQ(times[0].dense, 0.0) << "not asked for";
 }
 
+/// … and for the filter with several clones linear in the ranges, quadratic at most in the number of states.
+TEST(Complexity, OfSeveralClonesIsLinearInTheRangesAndQuadraticInTheStates) {
+  const std::vector<StateSize> sizes{{3, 0, 512}, {3, 0, 8192}, {4, 0, 360}, {32, 0, 360}, {2, 8, 360}, {2, 128, 360}};
+  const std::vector<double> times = measureUpdates(sizes, [] {});
+  const auto slope = [&](std::size_t i, double factor) { return std::log(times[i + 1] / times[i]) / std::log(factor); };
+  const auto states = [&](std::size_t i) { return static_cast<double>(sizes[i + 1].states()) / sizes[i].states(); };
+  EXPECT_GT(slope(0, 16.0), 0.5);
+  EXPECT_LT(slope(0, 16.0), 1.5);
+  for (const std::size_t i : {2U, 4U}) {
+    EXPECT_GT(slope(i, states(i)), 0.3) << "what is in the state costs";
+    EXPECT_LT(slope(i, states(i)), 2.6);
+  }
+}
+
 }  // namespace
 }  // namespace sckf

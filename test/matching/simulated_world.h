@@ -8,6 +8,8 @@ namespace sckf::test {
 using sckf::castRay;
 using sckf::closedPolygon;
 using sckf::corridor;
+using sckf::frontLaser;
+using sckf::rearLaser;
 using sckf::room;
 using sckf::SimulatedLaser;
 using sckf::simulateScan;

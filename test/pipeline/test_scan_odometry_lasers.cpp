@@ -9,18 +9,12 @@ namespace {
 constexpr std::size_t kFront = 0;
 constexpr std::size_t kRear = 1;
 
-/// A fast laser that looks ahead, and a slow one that looks back, turned and upside down as such things are mounted.
+/// A fast laser that looks ahead, and a slow one that looks back.
 class TwoLasers {
  public:
   TwoLasers() : front_(wheels()), rear_(wheels()) {
-    front_.laser.beams = 181;
-    front_.laser.angle_min = -M_PI / 2;
-    front_.laser.angle_increment = M_PI / 180.0;
-    front_.laser.base_from_laser = Eigen::Translation3d(0.3, 0.0, 0.2);
-    rear_.laser = front_.laser;
-    rear_.laser.base_from_laser = Eigen::Translation3d(-0.3, 0.1, 0.4) *
-                                  Eigen::AngleAxisd(M_PI - 0.2, Eigen::Vector3d::UnitZ()) *
-                                  Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX());
+    front_.laser = frontLaser();
+    rear_.laser = rearLaser();
   }
 
   /// front: scans at 40 Hz until then; rear: at 5 Hz, each of which comes rear_late ms after its stamp.

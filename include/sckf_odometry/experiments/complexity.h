@@ -1,4 +1,4 @@
-// What one update costs, by the number of ranges of a scan.
+// What one update costs, by the number of ranges of a scan and by what is in the state.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,5 +24,18 @@ void denseUpdate(const Eigen::MatrixXd& H, const Eigen::MatrixXd& noise, Eigen::
 /// The dense update is measured up to max_dense_ranges: its memory grows with the square as well. tick: after each.
 std::vector<UpdateTimes> measureUpdates(const std::vector<int>& ranges, int max_dense_ranges,
                                         const std::function<void()>& tick);
+
+/// What is in the state of the filter with several clones, each with the range noise of its scan.
+struct StateSize {
+  int clones = 2;     ///< 1 and more
+  int landmarks = 0;  ///< beside them
+  int ranges = 360;   ///< of a scan
+
+  int states() const { return 3 * (1 + clones + landmarks); }  ///< N
+};
+
+/// Best of several times of innovation and update [s] by a displacement from the oldest clone, which corrects all
+/// states.
+std::vector<double> measureUpdates(const std::vector<StateSize>& sizes, const std::function<void()>& tick);
 
 }  // namespace sckf

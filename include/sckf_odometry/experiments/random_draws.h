@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 #include <cstdint>
 #include <random>
 
@@ -17,7 +18,14 @@ class RandomDraws {
     return Eigen::VectorXd::NullaryExpr(n, [this] { return normal_(engine_); });
   }
 
- private:
+  /// A draw from N(0, P). P may be singular.
+  Eigen::VectorXd drawnFrom(const Eigen::MatrixXd& P) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(P);
+    const Eigen::VectorXd std_devs = eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+    return eigen.eigenvectors() * std_devs.cwiseProduct(gaussian(P.rows()));
+  }
+
+ protected:
   std::mt19937_64 engine_;
   std::normal_distribution<> normal_;
 };

@@ -68,6 +68,26 @@ struct SimulatedLaser {
   Eigen::Isometry3d base_from_laser = Eigen::Isometry3d::Identity();
 };
 
+/// Sees half a round ahead of the robot.
+inline SimulatedLaser frontLaser() {
+  SimulatedLaser laser;
+  laser.beams = 181;
+  laser.angle_min = -M_PI / 2;
+  laser.angle_increment = M_PI / 180.0;
+  laser.noise = 0.01;
+  laser.base_from_laser = Eigen::Translation3d(0.3, 0.0, 0.2);
+  return laser;
+}
+
+/// Sees half a round behind it, turned and upside down as such things are mounted.
+inline SimulatedLaser rearLaser() {
+  SimulatedLaser laser = frontLaser();
+  laser.base_from_laser = Eigen::Translation3d(-0.3, 0.1, 0.4) *
+                          Eigen::AngleAxisd(M_PI - 0.2, Eigen::Vector3d::UnitZ()) *
+                          Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX());
+  return laser;
+}
+
 /// A scan that base_link moves during: world_from_base so many seconds after the stamp. random may be null if the laser
 /// has no noise.
 inline LaserScan simulateSweep(const World& world, const std::function<SE2(double)>& world_from_base_at,

@@ -1,4 +1,4 @@
-#include "room_simulation.h"
+#include "sckf_odometry/experiments/room_simulation.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -33,7 +33,11 @@ int nearestBeam(const SimulatedScan& scan, const Eigen::Vector2d& point, int wal
 
 }  // namespace
 
-SimulatedScan RoomSimulation::scan(const SE2& odom_from_base, RandomInputs& random) const {
+std::vector<StraightWall> simulatedHall() { return {{{1, 0}, 8.0}, {{-1, 0}, 8.0}, {{0, 1}, 7.0}, {{0, -1}, 7.0}}; }
+
+std::vector<StraightWall> simulatedCorridor() { return {{{0, 1}, 2.0}, {{0, -1}, 2.0}}; }
+
+SimulatedScan RoomSimulation::scan(const SE2& odom_from_base, RandomDraws& random) const {
   SimulatedScan scan;
   scan.odom_from_base = odom_from_base;
   scan.noise = range_std_ * random.gaussian(kBeams);
@@ -75,7 +79,7 @@ RoomSimulation::Problem RoomSimulation::problem(const SimulatedScan& reference, 
 }
 
 Displacement RoomSimulation::match(const SimulatedScan& reference, const SimulatedScan& current,
-                                   RandomInputs& random) const {
+                                   RandomDraws& random) const {
   const Problem p = problem(reference, current);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> information(p.A.transpose() * p.A);
   const int d = static_cast<int>((information.eigenvalues().array() > 1e-9 * information.eigenvalues()(2)).count());

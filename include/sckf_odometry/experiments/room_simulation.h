@@ -5,17 +5,21 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "random_inputs.h"
 #include "sckf_odometry/core/displacement.h"
 #include "sckf_odometry/core/se2.h"
+#include "sckf_odometry/experiments/random_draws.h"
 
 namespace sckf {
 
 /// The line normalᵀ p = distance in odom; the robot is on the side of the origin.
-struct Wall {
+struct StraightWall {
   Eigen::Vector2d normal;
   double distance;
 };
+
+/// A hall of 16 m × 14 m around the origin, and two walls along x, 4 m apart, that never end.
+std::vector<StraightWall> simulatedHall();
+std::vector<StraightWall> simulatedCorridor();
 
 /// One scan: where its beams really ended, and the range noise z̃ that all displacements made with it share.
 struct SimulatedScan {
@@ -31,14 +35,14 @@ class RoomSimulation {
   static constexpr int kBeams = 60;
   static constexpr double kMaxRange = 20.0;  // [m]
 
-  RoomSimulation(std::vector<Wall> walls, double range_std) : walls_(std::move(walls)), range_std_(range_std) {}
+  RoomSimulation(std::vector<StraightWall> walls, double range_std) : walls_(std::move(walls)), range_std_(range_std) {}
 
-  SimulatedScan scan(const SE2& odom_from_base, RandomInputs& random) const;
+  SimulatedScan scan(const SE2& odom_from_base, RandomDraws& random) const;
 
   /// The displacement that least squares of e_i = nᵢᵀ (R pᵢ + t − qᵢ) finds, to first order in the noise: pᵢ a point of
   /// the current scan, qᵢ the nearest point of the reference on the same wall. Directions that the walls leave open
   /// are not observable, and what the displacement says about them is made up.
-  Displacement match(const SimulatedScan& reference, const SimulatedScan& current, RandomInputs& random) const;
+  Displacement match(const SimulatedScan& reference, const SimulatedScan& current, RandomDraws& random) const;
 
  private:
   struct Problem {
@@ -48,7 +52,7 @@ class RoomSimulation {
   };
   Problem problem(const SimulatedScan& reference, const SimulatedScan& current) const;
 
-  std::vector<Wall> walls_;
+  std::vector<StraightWall> walls_;
   double range_std_;
 };
 
