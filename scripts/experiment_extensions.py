@@ -6,8 +6,10 @@ from typing import Callable, Dict
 
 from experiment_base import (GREEN, GREY, WITH, WITHOUT, Result, Setting, markdown_table, new_figure, paragraph,
                              read_table, save_figure, simulate)
+from experiment_cost import update_cost
 from experiment_landmarks import landmarks
 from experiment_references import references
+from experiment_sensors import absolute_poses, calibration, imu, several_lasers, standstill
 
 
 def deskewing(setting: Setting) -> Result:
@@ -94,8 +96,10 @@ def odometry_models(setting: Setting) -> Result:
 
 
 SECTIONS: Dict[str, Callable[[Setting], Result]] = {
-    "references": references, "landmarks": landmarks,
-    "deskewing": deskewing, "cloud_input": cloud_input, "odometry_models": odometry_models}
+    "references": references, "several_lasers": several_lasers, "imu": imu, "absolute_poses": absolute_poses,
+    "standstill": standstill, "calibration": calibration, "landmarks": landmarks,
+    "deskewing": deskewing, "cloud_input": cloud_input, "odometry_models": odometry_models,
+    "update_cost": update_cost}
 
 
 def extensions(setting: Setting) -> Result:

@@ -31,7 +31,8 @@ def log_with_reference(setting: Setting) -> Tuple[Path, Trajectory]:
     bag, tum = setting.output / "simulated.bag", setting.output / "simulated.tum"
     if not SIMULATED.exists():
         raise ExperimentError(f"{SIMULATED}: not there; install mrpt-common, or name --bag and --reference")
-    run(setting, "rawlog_to_bag", [SIMULATED, bag, "--ground-truth", f"{SIMULATED}.GT.txt", "--tum", tum])
+    if not tum.exists():
+        run(setting, "rawlog_to_bag", [SIMULATED, bag, "--ground-truth", f"{SIMULATED}.GT.txt", "--tum", tum])
     return bag, read_tum(tum)
 
 
@@ -41,7 +42,8 @@ def replay_with(setting: Setting, bag: Path, reference: Trajectory, poses: int) 
     output = setting.output / f"references_{poses}.tum"
     topics = ["--scan-topic", setting.scan_topic, "--odom-topic", setting.odom_topic] if setting.reference else []
     said = run(setting, "replay", [bag, "--params", params, "--trajectory", output, *topics])
-    times = {what: 1e-3 * float(ms) for what, ms in re.findall(r"^(time of .+): median ([0-9.]+) ms", said, re.MULTILINE)}
+    medians = re.findall(r"^(time of .+): median ([0-9.]+) ms", said, re.MULTILINE)
+    times = {what: 1e-3 * float(milliseconds) for what, milliseconds in medians}
     used = re.search(r"older references used ([0-9]+) times, by ([0-9]+) scans", said)
     return Outcome(drift(reference, read_tum(output)), int(used[1]) / int(used[2]) if used else 0.0,
                    times["time of a scan that became a reference"], times["time of a scan"])
@@ -68,8 +70,8 @@ def references(setting: Setting) -> Result:
             by poses and by the ranges that they share. The time is the median of such a scan, everything counted:
             it is nearly all matching, and grows with the number of references that are used: those that are near enough
             and show enough of what the scan shows. Scans in between are compared with the newest one alone."""""),
-        markdown_table(["poses L", "`older_references`", "used, mean", "drift", "time of a scan that becomes a reference",
-                        "… over that of L = 2", "of every scan"], rows)]
+        markdown_table(["poses L", "`older_references`", "used, mean", "drift",
+                        "time of a scan that becomes a reference", "… over that of L = 2", "of every scan"], rows)]
     return result
 
 

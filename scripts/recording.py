@@ -1,6 +1,7 @@
 """What a bag holds of a run: the scans' points on the robot, the wheels' trajectory and the estimate."""
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
@@ -48,6 +49,22 @@ def read_recording(path: str, topics: Topics = Topics()) -> Recording:
     estimates = next((messages[topic] for topic in topics.estimate if messages[topic]), [])
     return Recording(np.array([scan.header.stamp.to_sec() for scan, _ in scans]), clouds, wheels,
                      _trajectory(estimates), _latencies(scans, estimates))
+
+
+def halved(path: str, output: str, scan_topic: str = "/scan") -> None:
+    """Writes the bag with each scan as those of two lasers: /right/scan and /left/scan."""
+    with rosbag.Bag(path) as source, rosbag.Bag(output, "w") as out:
+        for topic, message, stamp in source.read_messages():
+            if topic != scan_topic:
+                out.write(topic, message, stamp)
+                continue
+            middle = len(message.ranges) // 2
+            for side, part in ("/right/scan", slice(0, middle)), ("/left/scan", slice(middle, None)):
+                half = copy.copy(message)
+                half.ranges, half.intensities = message.ranges[part], []
+                half.angle_min = message.angle_min + (part.start or 0) * message.angle_increment
+                half.angle_max = half.angle_min + (len(half.ranges) - 1) * message.angle_increment
+                out.write(side, half, stamp)
 
 
 def _read_messages(path: str, topics: Topics) -> Dict[str, List[Tuple[Any, float]]]:

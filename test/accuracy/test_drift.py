@@ -7,7 +7,6 @@ says what was measured, beside the bounds and beside the wheels alone: run with 
 """
 from __future__ import annotations
 
-import copy
 import os
 import subprocess
 import sys
@@ -18,11 +17,10 @@ from pathlib import Path
 from typing import List, Optional, Sequence
 
 import numpy as np
-import rosbag
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "scripts"))
-from recording import read_recording  # noqa: E402
+from recording import halved, read_recording  # noqa: E402
 from revisit import closure, find_revisits  # noqa: E402
 from trajectory import Trajectory, drift, read_tum, sample  # noqa: E402
 
@@ -66,22 +64,6 @@ def recorded(name: str) -> Path:
         if not file.is_file():
             raise unittest.SkipTest(f"{file} is missing")
     return bag
-
-
-def halved(bag: Path, output: Path) -> None:
-    """The log with each scan as those of two lasers: /right/scan and /left/scan."""
-    with rosbag.Bag(str(bag)) as source, rosbag.Bag(str(output), "w") as out:
-        for topic, message, stamp in source.read_messages():
-            if topic != "/scan":
-                out.write(topic, message, stamp)
-                continue
-            middle = len(message.ranges) // 2
-            for side, part in ("/right/scan", slice(0, middle)), ("/left/scan", slice(middle, None)):
-                half = copy.copy(message)
-                half.ranges, half.intensities = message.ranges[part], []
-                half.angle_min = message.angle_min + (part.start or 0) * message.angle_increment
-                half.angle_max = half.angle_min + (len(half.ranges) - 1) * message.angle_increment
-                out.write(side, half, stamp)
 
 
 def installed(path: Path) -> Path:
@@ -143,7 +125,7 @@ class DriftTest(unittest.TestCase):
     def test_two_lasers_that_see_half_each(self) -> None:
         bag = recorded("intel")
         halves = self.path("halves.bag")
-        halved(bag, halves)
+        halved(str(bag), str(halves))
         reference = read_tum(bag.with_suffix(".tum"))
         both = drift(reference, self.replayed(halves, scans=("/right/scan", "/left/scan")))
         right = drift(reference, self.replayed(halves, scans=("/right/scan",)))

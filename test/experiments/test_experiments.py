@@ -30,7 +30,9 @@ RUNS = 20
 FIGURES = ("four_methods", "four_methods_covariance", "line_matching", "line_matching_nees", "line_matching_ratios",
            "displacement_only", "displacement_only_covariance", "one_dimension", "visual_odometry", "complexity",
            "extensions_deskewing", "extensions_cloud_input", "extensions_odometry_models",
-           "extensions_landmarks", "extensions_references")
+           "extensions_landmarks", "extensions_references", "extensions_several_lasers", "extensions_imu",
+           "extensions_absolute_poses", "extensions_standstill", "extensions_calibration",
+           "extensions_update_cost")
 
 
 def experiment(arguments: List[str], **options: object) -> subprocess.CompletedProcess:
@@ -146,9 +148,66 @@ class AllExperiments(unittest.TestCase):
         self.assertLess(nees["differential", "ackermann"], 0.1, "it turns on the spot, and is not believed")
 
 
+    def section(self, name: str) -> Dict[str, float]:
+        return {key[len(name) + 1:]: value for key, value in self.numbers("extensions").items()
+                if key.startswith(name + "_")}
+
+    def assert_consistent(self, n: Dict[str, float], *robots: str) -> None:
+        """As well as so few robots tell; of 3 dimensions."""
+        for name in robots:
+            self.assertTrue(1.8 < n[f"{name}_nees"] < 4.5, f"{name}: {n}")
+
+    def test_two_lasers_are_better_than_each(self) -> None:
+        n = self.section("several_lasers")
+        self.assert_consistent(n, "fast", "slow", "both")
+        for kind, each in (("", ("fast", "slow")), ("mounted_", ("front", "rear"))):
+            for one in each:
+                self.assertLess(n[f"{kind}both_position"], 0.9 * n[f"{kind}{one}_position"], n)
+        for half in ("right", "left"):
+            self.assertLess(n["log_both_drift_percent"], 0.75 * n[f"log_{half}_drift_percent"], n)
+        self.assertLess(n["log_uncut_drift_percent"], n["log_both_drift_percent"], "nothing is lost between its halves")
+
+    def test_an_imu_holds_the_heading_where_scans_do_not(self) -> None:
+        n = self.section("imu")
+        self.assert_consistent(n, *(f"{scans}_{name}" for scans in ("seeing", "blind")
+                                    for name in ("wheels", "gyro", "orientation", "both")))
+        self.assertLess(n["blind_gyro_yaw"], 0.8 * n["blind_wheels_yaw"])
+        self.assertLess(n["blind_orientation_yaw"], 0.4 * n["blind_wheels_yaw"])
+        self.assertLess(n["blind_both_yaw"], 0.75 * n["blind_orientation_yaw"])
+        for name in ("gyro", "both"):
+            self.assertTrue(0.5 < n[f"{name}_bias_nees"] < 1.7, n)
+            self.assertLess(n[f"{name}_bias"], 0.5 * 0.02, "it is drawn with a std of 0.02 rad/s")
+
+    def test_absolute_poses_hold_the_robot_in_map_and_leave_odom_alone(self) -> None:
+        n = self.section("absolute_poses")
+        self.assert_consistent(n, "seeing_without", "seeing_with", "blind_without", "blind_with", "every_sensor")
+        self.assertTrue(1.8 < n["every_sensor_calibration_nees"] < 4.5, n)
+        self.assertTrue(0.5 < n["every_sensor_bias_nees"] < 1.7, n)
+        self.assertLess(n["blind_with_position"], 0.15, "they are told with a std of 0.1 m")
+        self.assertGreater(n["blind_without_position"], 5.0 * n["blind_with_position"])
+        self.assertLess(n["map_end"], 0.5 * n["odom_end"])
+        self.assertEqual(n["odom_moved"], 0.0)
+        self.assertLess(n["odom_step"], 0.005)
+        self.assertGreater(n["map_step"], 10.0 * n["odom_step"], "or nothing corrects it")
+
+    def test_a_robot_that_knows_that_it_stands_finds_the_bias_of_its_gyro(self) -> None:
+        n = self.section("standstill")
+        self.assert_consistent(n, "without", "with", "gyro_without", "gyro_with")
+        self.assertLess(n["gyro_with_bias"], 0.6 * n["gyro_without_bias"])
+        self.assertLess(n["gyro_with_yaw"], 0.6 * n["gyro_without_yaw"])
+
+    def test_wheels_that_have_been_found_out_lead_a_blind_robot_better(self) -> None:
+        n = self.section("calibration")
+        self.assert_consistent(n, "with")
+        self.assertTrue(1.8 < n["scale_nees"] < 4.5, n)
+        self.assertGreater(n["without_nees"], 3.0 * n["with_nees"], "wheels that are taken for right")
+        self.assertLess(n["scale"], 0.6 * 0.1, "it is drawn with a std of 0.1")
+        self.assertLess(n["with_position"], 0.75 * n["without_position"])
+
     def test_more_references_drift_less_and_cost_what_their_matches_cost(self) -> None:
-        n = {poses: {key: self.numbers("extensions")[f"references_{poses}_{key}"]
-                     for key in ("drift_percent", "drift_deg_per_m", "older", "time_ratio")} for poses in (2, 3, 4, 5, 8)}
+        keys = ("drift_percent", "drift_deg_per_m", "older", "time_ratio")
+        numbers = self.section("references")
+        n = {poses: {key: numbers[f"{poses}_{key}"] for key in keys} for poses in (2, 3, 4, 5, 8)}
         for fewer, more in ((2, 4), (4, 8)):
             self.assertLess(n[more]["drift_percent"], 0.9 * n[fewer]["drift_percent"], n)
             self.assertLess(n[more]["drift_deg_per_m"], 0.9 * n[fewer]["drift_deg_per_m"], n)
@@ -158,6 +217,12 @@ class AllExperiments(unittest.TestCase):
         self.assertGreater(n[8]["older"], n[3]["older"] + 0.5)
         self.assertGreater(n[8]["time_ratio"], 1.3, "it matches with more, and is not quicker")
         self.assertLess(n[8]["time_ratio"], 1.6 * (1.0 + n[8]["older"]), "a match costs about what the first one does")
+
+    def test_an_update_is_linear_in_the_ranges_and_quadratic_in_the_states(self) -> None:
+        n = self.section("update_cost")  # timings: the bounds tell the three apart, and no more
+        self.assertTrue(0.5 < n["slope_ranges"] < 1.5, n)
+        for name in ("clones", "landmarks"):
+            self.assertTrue(0.3 < n[f"slope_{name}"] < 2.6, n)
 
     def test_landmarks_beside_displacements_do_no_harm(self) -> None:
         n = self.numbers("extensions")
