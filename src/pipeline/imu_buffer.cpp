@@ -76,6 +76,16 @@ std::optional<double> ImuBuffer::yaw(Stamp stamp) const {
   return wrapAngle(*before->yaw + share(*before, *after, stamp) * wrapAngle(*after->yaw - *before->yaw));
 }
 
+std::optional<double> ImuBuffer::takeYaw(Stamp stamp) {
+  const std::optional<double> yaw = this->yaw(stamp);
+  if (!yaw) return std::nullopt;
+  const auto after = bracket(stamp);
+  const Stamp oldest = after->stamp == stamp ? stamp : std::prev(after)->stamp;
+  if (taken_ && oldest <= *taken_) return std::nullopt;
+  taken_ = after->stamp;
+  return yaw;
+}
+
 void ImuBuffer::discardBefore(Stamp stamp) {
   while (samples_.size() > 1 && samples_[1].stamp <= stamp) samples_.pop_front();
   discarded_ = stamp;

@@ -341,6 +341,7 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
   odometry_.discardBefore(stamp);
   wheels_known_ = true;
   standstill_.interrupt();
+  imu_.forgetTaken();
   references_.clear();
   for (Laser& laser : lasers_) {
     laser.policy = ReferencePolicy(options_.reference);
@@ -397,7 +398,7 @@ void ScanOdometry::leaveTrail() {
 
 void ScanOdometry::useHeading(ScanReport& report) {
   if (!options_.imu.orientation) return;
-  const std::optional<double> yaw = imu_.yaw(report.stamp);
+  const std::optional<double> yaw = imu_.takeYaw(report.stamp);
   if (!yaw) return;
   const double std = options_.imu.orientation_std;
   const double bound = chiSquared(1, options_.gate.probability);

@@ -59,6 +59,19 @@ TEST_F(ImuBufferTest, TheYawIsInterpolatedTheShorterWay) {
   EXPECT_FALSE(imu_.rotation(at(0), at(10))) << "there is no rate";
 }
 
+TEST_F(ImuBufferTest, AYawIsTakenOnce) {
+  fill(0, 60);
+  EXPECT_TRUE(imu_.takeYaw(at(5)));
+  EXPECT_FALSE(imu_.takeYaw(at(5))) << "the same instant";
+  EXPECT_FALSE(imu_.takeYaw(at(7))) << "between the same two";
+  EXPECT_FALSE(imu_.takeYaw(at(12))) << "one of them";
+  EXPECT_NEAR(imu_.takeYaw(at(20)).value(), imu_.yaw(at(20)).value(), 0.0);
+  EXPECT_FALSE(imu_.takeYaw(at(25))) << "which begins where the last one was";
+  EXPECT_TRUE(imu_.takeYaw(at(35)));
+  imu_.forgetTaken();
+  EXPECT_TRUE(imu_.takeYaw(at(35)));
+}
+
 TEST_F(ImuBufferTest, AReadingWithoutRateOrWithoutYawLeavesAHole) {
   fill(0, 20);
   imu_.insert({at(30), {}, {}});

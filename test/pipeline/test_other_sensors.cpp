@@ -240,6 +240,31 @@ TEST(OtherSensors, AHeadingThatContradictsIsNotUsed) {
   expectAccurate(drive, driven);
 }
 
+TEST(OtherSensors, AHeadingIsUsedOnceHoweverManyLasersSeeAtThatInstant) {
+  const SimulatedDrive drive;
+  const SimulatedImu imu{drive};
+  PipelineOptions options;
+  options.imu.orientation = true;
+  options.lasers = 2;
+  Driven driven(drive, options);
+  driven.odometry(0);
+  driven.pipeline.addImu(imu.at(1));
+  for (int ms = 1; ms <= 1000; ++ms) {
+    if (ms % 10 == 0) driven.pipeline.addImu(imu.at(ms));
+    if (ms % 20 == 0) driven.odometry(ms);
+    for (const std::size_t laser : {0U, 1U}) {
+      if (ms % 100 == 7) driven.pipeline.addScan(drive.scan(ms), drive.laser.base_from_laser, laser);
+    }
+    driven.process();
+  }
+  ASSERT_GT(driven.reports.size(), 15U);
+  for (std::size_t i = 0; i + 1 < driven.reports.size(); i += 2) {
+    ASSERT_EQ(driven.reports[i].stamp, driven.reports[i + 1].stamp);
+    EXPECT_EQ(driven.reports[i].heading, HeadingUse::kUsed);
+    EXPECT_EQ(driven.reports[i + 1].heading, HeadingUse::kNone);
+  }
+}
+
 // ---- standstill
 
 /// Encoders of a robot that stands tell of motion now and then.

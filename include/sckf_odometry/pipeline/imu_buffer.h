@@ -43,6 +43,12 @@ class ImuBuffer {
   /// The yaw at an instant [rad], interpolated; empty unless readings on both sides tell it.
   std::optional<double> yaw(Stamp stamp) const;
 
+  /// As yaw(), but each reading tells its yaw once: empty if one of those on both sides has been taken before.
+  std::optional<double> takeYaw(Stamp stamp);
+
+  /// All readings may be taken once more.
+  void forgetTaken() { taken_.reset(); }
+
   /// Forgets what lies before the reading that brackets the instant.
   void discardBefore(Stamp stamp);
 
@@ -56,6 +62,7 @@ class ImuBuffer {
   double longest_gap_;  // [s]
   Samples samples_;     // sorted by stamp, no two equal
   std::optional<Stamp> discarded_;
+  std::optional<Stamp> taken_;  // the newest reading whose yaw has been taken
 };
 
 }  // namespace sckf

@@ -39,7 +39,7 @@ bool wasUsed(ScanOutcome outcome);
 
 /// What became of a heading.
 enum class HeadingUse {
-  kNone,         ///< there is none
+  kNone,         ///< there is none, or its readings have been used for another scan
   kUsed,         ///< it corrected the estimate, or, the first one, told how the IMU's world is turned
   kContradicts,  ///< it contradicts the estimate beyond the gate
 };
