@@ -31,6 +31,8 @@ constexpr Colour kLabelColour{1.0F, 0.90F, 0.63F};
 /// All markers there are. A displacement sees one direction at least, so two at most are not seen.
 enum Index : std::size_t { kPairs, kCovariance, kUnobservable, kSecondUnobservable, kLabel, kMarkers };
 
+constexpr int kIds = 2;  // of a laser in a name space
+
 struct Name {
   const char* name_space;
   int id;
@@ -123,10 +125,11 @@ std::string numbers(const Eigen::Matrix2d& half_axes) {
   return text.data();
 }
 
-void drawLabel(Marker& marker, const SE2& odom_from_base, const std::string& text) {
+void drawLabel(Marker& marker, const SE2& odom_from_base, std::size_t laser, const std::string& text) {
   draw(marker, Marker::TEXT_VIEW_FACING, kLabelColour);
   marker.scale.z = kTextHeight;
-  marker.pose.position = toPoint(odom_from_base.translation() - Eigen::Vector2d(0.0, 5.0 * kTextHeight));
+  const double below = 5.0 * kTextHeight * static_cast<double>(1 + laser);
+  marker.pose.position = toPoint(odom_from_base.translation() - Eigen::Vector2d(0.0, below));
   marker.text = text;
 }
 
@@ -149,7 +152,7 @@ Eigen::Matrix3d displacementCovariance(const Displacement& displacement, const D
 }
 
 MarkerArray debugMarkers(const ScanReport& report, const PlacedScan& reference, const std::string& frame) {
-  MarkerArray array = noDebugMarkers(report.stamp, frame);
+  MarkerArray array = noDebugMarkers(report.stamp, frame, report.laser);
   const PlacedScan aligned{report.scan, report.estimate->odom_from_base};
   if (!report.match.pairs.empty()) drawPairs(array.markers[kPairs], reference, aligned, report.match.pairs);
   std::string label = numbers(report);
@@ -164,18 +167,18 @@ MarkerArray debugMarkers(const ScanReport& report, const PlacedScan& reference, 
                 reference.odom_from_base, unseen.col(i));
     }
   }
-  drawLabel(array.markers[kLabel], aligned.odom_from_base, label);
+  drawLabel(array.markers[kLabel], aligned.odom_from_base, report.laser, label);
   return array;
 }
 
-MarkerArray noDebugMarkers(Stamp stamp, const std::string& frame) {
+MarkerArray noDebugMarkers(Stamp stamp, const std::string& frame, std::size_t laser) {
   MarkerArray array;
   for (const Name& name : kNames) {
     Marker marker;
     marker.header.stamp = toTime(stamp);
     marker.header.frame_id = frame;
     marker.ns = name.name_space;
-    marker.id = name.id;
+    marker.id = name.id + kIds * static_cast<int>(laser);
     marker.action = Marker::DELETE;
     marker.pose.orientation.w = 1.0;
     array.markers.push_back(marker);

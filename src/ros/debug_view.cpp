@@ -31,27 +31,35 @@ void publishIfWatched(const ros::Publisher& publisher, const Build& build) {
 
 DebugView::DebugView(ros::NodeHandle nh, const NodeOptions& options)
     : odom_frame_(options.odom_frame),
-      reference_scan_(nh.advertise<sensor_msgs::PointCloud2>("debug/reference_scan", kQueue)),
-      aligned_scan_(nh.advertise<sensor_msgs::PointCloud2>("debug/aligned_scan", kQueue)),
       markers_(nh.advertise<visualization_msgs::MarkerArray>("debug/markers", kQueue)),
-      landmarks_(nh.advertise<visualization_msgs::MarkerArray>("landmarks", kQueue)) {}
+      landmarks_(nh.advertise<visualization_msgs::MarkerArray>("landmarks", kQueue)) {
+  for (std::size_t laser = 0; laser < rangeTopics(options).size(); ++laser) {
+    const std::string number = laser == 0 ? "" : "_" + std::to_string(laser + 1);
+    lasers_.push_back({nh.advertise<sensor_msgs::PointCloud2>("debug/reference_scan" + number, kQueue),
+                       nh.advertise<sensor_msgs::PointCloud2>("debug/aligned_scan" + number, kQueue),
+                       {}});
+  }
+}
 
 void DebugView::show(const ScanReport& report) {
   if (!report.estimate) return;
   publish(report);
-  if (report.new_reference) reference_ = {report.scan, report.estimate->odom_from_base};
+  if (report.new_reference) lasers_[report.laser].reference = {report.scan, report.estimate->odom_from_base};
 }
 
 void DebugView::publish(const ScanReport& report) const {
-  const bool compared = report.scan && reference_.scan && report.reference_stamp == reference_.scan->stamp;
+  const Laser& laser = lasers_[report.laser];
+  const PlacedScan& reference = laser.reference;
+  const bool compared = report.scan && reference.scan && report.reference_stamp == reference.scan->stamp;
   const PlacedScan aligned{report.scan, report.estimate->odom_from_base};
   // At the scan's stamp, all of them: the reference may be so old that TF has forgotten its time.
-  publishIfWatched(reference_scan_,
-                   [&] { return toCloud(compared ? reference_ : PlacedScan(), report.stamp, odom_frame_); });
-  publishIfWatched(aligned_scan_,
+  publishIfWatched(laser.reference_scan,
+                   [&] { return toCloud(compared ? reference : PlacedScan(), report.stamp, odom_frame_); });
+  publishIfWatched(laser.aligned_scan,
                    [&] { return toCloud(compared ? aligned : PlacedScan(), report.stamp, odom_frame_); });
   publishIfWatched(markers_, [&] {
-    return compared ? debugMarkers(report, reference_, odom_frame_) : noDebugMarkers(report.stamp, odom_frame_);
+    return compared ? debugMarkers(report, reference, odom_frame_)
+                    : noDebugMarkers(report.stamp, odom_frame_, report.laser);
   });
   publishIfWatched(landmarks_, [&] { return landmarkMarkers(report.landmarks, report.stamp, odom_frame_); });
 }

@@ -81,6 +81,20 @@ Marker drawn(const ScanReport& report, const std::string& name_space, int id = 0
 
 Eigen::Vector2d at(const Marker& marker, std::size_t i) { return {marker.points.at(i).x, marker.points.at(i).y}; }
 
+TEST(DebugMarkers, EachLaserHasItsOwn) {
+  ScanReport second = comparedScan();
+  second.laser = 1;
+  std::set<std::pair<std::string, int>> names;
+  for (const ScanReport& report : {comparedScan(), second}) {
+    for (const Marker& marker : debugMarkers(report, referenceScan(), "odom").markers) {
+      EXPECT_TRUE(names.emplace(marker.ns, marker.id).second) << marker.ns << " " << marker.id;
+    }
+    for (const Marker& marker : noDebugMarkers(Stamp(7000000001), "odom", report.laser).markers) {
+      EXPECT_EQ(names.count({marker.ns, marker.id}), 1U);
+    }
+  }
+}
+
 TEST(DebugMarkers, APairIsALineFromThePointOfTheReferenceToThatOfTheScanAtTheEstimate) {
   const Marker pairs = drawn(comparedScan(), "pairs");
   EXPECT_EQ(pairs.action, Marker::ADD);

@@ -6,6 +6,7 @@ import unittest
 import numpy as np
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
+from sensor_msgs.msg import PointCloud2
 
 import junit_runner
 import run_helpers as helpers
@@ -17,6 +18,7 @@ DURATION = 30.0  # [s]
 DIES = 20.0  # [s] of the drive: the rear laser
 EVERY = 3  # scans of the front laser there is one of the rear one, which comes LATE seconds after its stamp
 LATE = 0.2
+DRAWN = {'/scan': 'debug/aligned_scan', '/rear/scan': 'debug/aligned_scan_2'}
 
 
 def messages():
@@ -38,10 +40,19 @@ class Lasers(unittest.TestCase):
         sent = messages()
         cls.sent = {topic: len([t for t, _, _ in sent if t == topic]) for topic in ('/scan', '/rear/scan', '/odom')}
         cls.recorder.wait_for_connection()
+        cls.drawn = {topic: set() for topic in DRAWN}
+        views = [rospy.Subscriber(view, PointCloud2, cls.note_drawn, topic, queue_size=None)
+                 for topic, view in DRAWN.items()]
+        helpers.wait_until(lambda: all(view.get_num_connections() > 0 for view in views), 'the topics of the view')
         helpers.Feeder(['/odom', '/scan', '/rear/scan', '/tf_static']).feed(sent, speed=5.0)
         scans = cls.sent['/scan'] + cls.sent['/rear/scan']
         helpers.wait_until(lambda: helpers.accounted(cls.recorder.diagnostics(), 'scans', scans), 'all scans')
         helpers.wait_until(lambda: cls.silence(), 'the silence of the rear laser in the diagnostics')
+
+    @classmethod
+    def note_drawn(cls, cloud, topic):
+        if cloud.width > 0:
+            cls.drawn[topic].add(cloud.header.stamp.to_nsec())
 
     @classmethod
     def silence(cls):
@@ -72,6 +83,11 @@ class Lasers(unittest.TestCase):
                 reference = message.header.stamp - rospy.Duration(message.reference_age)
                 nearest = min(abs(reference.to_nsec() - stamp) for stamp in stamps)
                 self.assertLess(nearest, 1e6, 'a reference that is no scan of ' + topic)
+
+    def test_rviz_is_shown_every_scan_of_both(self):
+        for topic, drawn in self.drawn.items():
+            compared = {m.header.stamp.to_nsec() for m in self.statuses(topic) if m.accepted}
+            self.assertGreaterEqual(len(drawn & compared), len(compared) - 3, topic)
 
     def test_they_are_taken_in_the_order_of_their_stamps(self):
         stamps = [m.header.stamp.to_sec() for m in self.recorder.messages('status')]

@@ -34,7 +34,7 @@ Eigen::Matrix3Xd unobservableDirections(const Displacement& displacement);
 Eigen::Matrix3d displacementCovariance(const Displacement& displacement, const DisplacementPrediction& prediction);
 
 /// Always the same markers (name space, id), so that each message takes the place of the one before; those that do not
-/// apply are to be deleted. In `frame`, at the scan's stamp:
+/// apply are to be deleted. Each laser has its own, by the id. In `frame`, at the scan's stamp:
 ///   pairs         lines from the points of the reference scan to those of the scan at the estimate
 ///   covariance    ellipse of the displacement, about where the displacement puts base_link
 ///   unobservable  arrows, one for each direction that the scans do not see: from base_link forwards, or, for a turn,
@@ -44,7 +44,7 @@ Eigen::Matrix3d displacementCovariance(const Displacement& displacement, const D
 visualization_msgs::MarkerArray debugMarkers(const ScanReport& report, const PlacedScan& reference,
                                              const std::string& frame);
 
-/// All of them deleted.
-visualization_msgs::MarkerArray noDebugMarkers(Stamp stamp, const std::string& frame);
+/// All of them deleted, of a laser.
+visualization_msgs::MarkerArray noDebugMarkers(Stamp stamp, const std::string& frame, std::size_t laser = 0);
 
 }  // namespace sckf
