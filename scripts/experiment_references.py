@@ -13,7 +13,7 @@ from trajectory import Drift, Trajectory, drift, read_tum
 SIMULATED = Path("/usr/share/mrpt/datasets/graphslam-engine-demos/action_observations_map/simul.rawlog")
 # Poses that a displacement constrains: the present one, that of the newest reference, and those of older ones.
 POSES = (2, 3, 4, 5, 8)
-DEFAULT = 4
+DEFAULT = 5
 
 
 @dataclass(frozen=True)

@@ -39,29 +39,31 @@ Eigen::Vector2d toNextPoint(const ScannedPoints& points, std::size_t i) {
 AlignmentProblem::AlignmentProblem(const PreparedScan& reference, const PreparedScan& current,
                                    const SE2& reference_from_current, double max_distance, const PairOptions& options)
     : reference_(reference), current_(current) {
+  const RigidMotion motion(reference_from_current);
   for (const auto& match : nearestNeighbours(reference, current, reference_from_current, max_distance)) {
     const Pair pair{static_cast<int>(match.globalIdx), static_cast<int>(match.localIdx)};
     const bool on_surface = reference.surface[match.globalIdx].valid();
     if (on_surface) {
-      addSurfacePair(pair, reference_from_current, options);
+      addSurfacePair(pair, motion, options);
     } else if (!current.surface[match.localIdx].valid()) {
       addPointPair(pair, options);
     }
   }
-  fitKernel(reference_from_current, options);
+  fitKernel(motion, options);
 }
 
-void AlignmentProblem::addSurfacePair(const Pair& pair, const SE2& reference_from_current, const PairOptions& options) {
+void AlignmentProblem::addSurfacePair(const Pair& pair, const RigidMotion& reference_from_current,
+                                      const PairOptions& options) {
   const auto i = static_cast<std::size_t>(pair.reference);
   const auto j = static_cast<std::size_t>(pair.current);
   const Surface& surface = reference_.surface[i];
-  const Eigen::Matrix2d C = reference_from_current.rotation();
+  const auto& [C, t] = reference_from_current;
   const double incidence = surface.normal.dot(C * current_.points.ray[j]);
   if (incidence > 0.0) return;  // the current scan would see the surface from behind
   const Surface& seen = current_.surface[j];
   if (seen.valid() && surface.normal.dot(C * seen.normal) < std::cos(options.max_normal_angle)) return;
 
-  const double along = surface.tangent().dot(reference_from_current * current_.points.point[j] - surface.centroid);
+  const double along = surface.tangent().dot(C * current_.points.point[j] + t - surface.centroid);
   const double line_variance = square(reference_.range_noise * surface.normal.dot(reference_.points.ray[i])) *
                                (1.0 / surface.size() + square(along) / surface.spread);
   const double variance = square(current_.range_noise * incidence) + line_variance + square(options.surface_roughness);
@@ -84,7 +86,7 @@ void AlignmentProblem::addPointPair(const Pair& pair, const PairOptions& options
       {pair.reference, pair.current, along, anchor, nullptr, std::sqrt(variance + step.squaredNorm())});
 }
 
-void AlignmentProblem::fitKernel(const SE2& reference_from_current, const PairOptions& options) {
+void AlignmentProblem::fitKernel(const RigidMotion& reference_from_current, const PairOptions& options) {
   constexpr double kGaussian = 1.4826;
   constexpr double kMaxScale = 3.0;  // beyond, the pairs are wrong and not the surfaces rough
   std::vector<double> deviations;
@@ -104,10 +106,10 @@ double AlignmentProblem::overlap() const {
   return static_cast<double>(pairs_.size()) / static_cast<double>(current_.size());
 }
 
-ResidualTerms AlignmentProblem::terms(const Residual& residual, const SE2& reference_from_current) const {
+ResidualTerms AlignmentProblem::terms(const Residual& residual, const RigidMotion& reference_from_current) const {
   ResidualTerms terms;
-  terms.lever = reference_from_current.rotation() * current_.points.point[static_cast<std::size_t>(residual.current)];
-  terms.offset = terms.lever + reference_from_current.translation() - residual.anchor;
+  terms.lever = reference_from_current.C * current_.points.point[static_cast<std::size_t>(residual.current)];
+  terms.offset = terms.lever + reference_from_current.t - residual.anchor;
   terms.e = residual.normal.dot(terms.offset) / residual.std;
   terms.A << residual.normal, residual.normal.dot(quarterTurn(terms.lever));
   terms.A /= residual.std;
@@ -116,9 +118,10 @@ ResidualTerms AlignmentProblem::terms(const Residual& residual, const SE2& refer
 
 NormalEquations AlignmentProblem::normalEquations(const SE2& reference_from_current) const {
   NormalEquations equations;
+  const RigidMotion motion(reference_from_current);
   double lever_square_sum = 0.0;
   for (const Residual& residual : residuals_) {
-    const ResidualTerms t = terms(residual, reference_from_current);
+    const ResidualTerms t = terms(residual, motion);
     const double w = kernel_.weight(t.e) / (scale_ * scale_);
     equations.information += w * t.A * t.A.transpose();
     equations.gradient += w * t.e * t.A;
@@ -141,11 +144,12 @@ Eigen::Vector3d AlignmentProblem::derivativeByNormal(const Residual& residual, c
 
 double AlignmentProblem::cost(const SE2& reference_from_current) const {
   constexpr double kUnpaired = 3.0;
+  const RigidMotion motion(reference_from_current);
   const RobustKernel kernel{2.0};  // one for all alignments, whatever their own scale
   double sum = kUnpaired * static_cast<double>(current_.size() - pairs_.size());
   for (const Residual& residual : residuals_) {
     const double share = residual.surface != nullptr ? 1.0 : 0.5;
-    sum += share * std::min(kUnpaired, kernel.loss(terms(residual, reference_from_current).e));
+    sum += share * std::min(kUnpaired, kernel.loss(terms(residual, motion).e));
   }
   return sum;
 }

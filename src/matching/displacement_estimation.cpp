@@ -60,8 +60,8 @@ void addSurfaceDerivatives(const AlignmentProblem& problem, const Residual& resi
   }
 }
 
-void addDerivatives(const AlignmentProblem& problem, const Residual& residual, const SE2& x, const ResidualTerms& t,
-                    LossDerivatives& out) {
+void addDerivatives(const AlignmentProblem& problem, const Residual& residual, const RigidMotion& x,
+                    const ResidualTerms& t, LossDerivatives& out) {
   const double influence = problem.kernel().influence(t.e);
   const double slope = problem.kernel().slope(t.e);
   out.hessian += slope * t.A * t.A.transpose();
@@ -69,7 +69,7 @@ void addDerivatives(const AlignmentProblem& problem, const Residual& residual, c
 
   const ScannedPoints& current = problem.current().points;
   const auto c = static_cast<std::size_t>(residual.current);
-  const Eigen::Vector2d ray = x.rotation() * current.ray[c];
+  const Eigen::Vector2d ray = x.C * current.ray[c];
   Eigen::Vector3d by_range = slope / residual.std * residual.normal.dot(ray) * t.A;
   by_range.z() += influence / residual.std * residual.normal.dot(quarterTurn(ray));
   out.by_current.col(current.beam[c]) += by_range;
@@ -83,7 +83,7 @@ void addDerivatives(const AlignmentProblem& problem, const Residual& residual, c
   }
 }
 
-LossDerivatives differentiate(const AlignmentProblem& problem, const SE2& x, const EstimationOptions& options) {
+LossDerivatives differentiate(const AlignmentProblem& problem, const RigidMotion& x, const EstimationOptions& options) {
   LossDerivatives out(problem);
   Eigen::Vector3d block_gradient = Eigen::Vector3d::Zero();
   int block = -1;
@@ -128,7 +128,7 @@ std::optional<DisplacementEstimate> estimateDisplacement(const AlignmentProblem&
   const ObservableDirections seen = observableDirections(problem.normalEquations(start), options.observability);
   if (seen.dimension() == 0) return std::nullopt;
   const SE2 x = minimise(problem, start, seen);
-  const LossDerivatives loss = differentiate(problem, x, options);
+  const LossDerivatives loss = differentiate(problem, RigidMotion(x), options);
   const MatrixDD hessian = seen.basis.transpose() * loss.hessian * seen.basis;
   const MatrixD3 implicit = hessian.inverse() * seen.basis.transpose();
 
@@ -144,6 +144,22 @@ std::optional<DisplacementEstimate> estimateDisplacement(const AlignmentProblem&
   z.matching_noise = matchingNoise(z.covariance(), implicit * loss.scatter * implicit.transpose(), loss.blocks);
   estimate.residual_rms = std::sqrt(loss.loss_square / loss.loss_weight);
   return estimate;
+}
+
+Displacement meanOfBothWays(const Displacement& there, const Displacement& back) {
+  Eigen::Matrix3d by_back;
+  const SE2 inverted = inverse(back.reference_from_current, &by_back);
+  const Eigen::Matrix3d to_coordinates = there.observable;
+  const Eigen::Matrix3d A = to_coordinates * by_back * Eigen::Matrix3d(back.observable).inverse();
+  const Eigen::Vector3d half_difference = 0.5 * error(inverted, there.reference_from_current);
+  const Eigen::Vector3d d = to_coordinates * half_difference;
+  Displacement mean = there;
+  mean.reference_from_current = corrected(there.reference_from_current, half_difference);
+  mean.J_reference = 0.5 * (there.J_reference + A * back.J_current);
+  mean.J_current = 0.5 * (there.J_current + A * back.J_reference);
+  mean.matching_noise =
+      symmetric(0.5 * (there.matching_noise + A * back.matching_noise * A.transpose()) + d * d.transpose());
+  return mean;
 }
 
 }  // namespace sckf

@@ -164,6 +164,21 @@ Match concluded(const std::optional<Alignment>& aligned, const MatcherOptions& o
   return match;
 }
 
+/// The match refined by one of the scans with their roles exchanged, if there is one close to it.
+Match refinedByReturn(Match match, const PreparedScan& reference, const PreparedScan& current,
+                      const MatcherOptions& options) {
+  constexpr double kFarthest = 0.1;  // [m]
+  constexpr double kTurned = 0.05;   // [rad]
+  if (!options.both_ways || !match.displacement || match.displacement->dimension() != 3) return match;
+  const SE2& there = match.displacement->reference_from_current;
+  const Match back = concluded(Search(current, reference, {inverse(there)}, options).runNear(), options);
+  if (!back.displacement || back.displacement->dimension() != 3) return match;
+  const Eigen::Vector3d e = error(inverse(back.displacement->reference_from_current), there);
+  if (e.head<2>().norm() > kFarthest || std::abs(e.z()) > kTurned) return match;
+  match.displacement = meanOfBothWays(*match.displacement, *back.displacement);
+  return match;
+}
+
 }  // namespace
 
 std::string toString(MatchFailure failure) {
@@ -184,12 +199,14 @@ std::string toString(MatchFailure failure) {
 
 Match ScanMatcher::match(const PreparedScan& reference, const PreparedScan& current,
                          const DisplacementPrediction& prediction) const {
-  return concluded(Search(reference, current, prediction, options_).run(), options_);
+  const std::optional<Alignment> aligned = Search(reference, current, prediction, options_).run();
+  return refinedByReturn(concluded(aligned, options_), reference, current, options_);
 }
 
 Match ScanMatcher::matchNear(const PreparedScan& reference, const PreparedScan& current,
                              const DisplacementPrediction& prediction) const {
-  return concluded(Search(reference, current, prediction, options_).runNear(), options_);
+  const std::optional<Alignment> aligned = Search(reference, current, prediction, options_).runNear();
+  return refinedByReturn(concluded(aligned, options_), reference, current, options_);
 }
 
 }  // namespace sckf

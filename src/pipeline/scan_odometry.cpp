@@ -247,6 +247,7 @@ void ScanOdometry::compareWithOlderReferences(ScanReport& report) {
     if (!match.displacement || match.overlap < options.older_min_overlap) continue;
     Displacement& displacement = *match.displacement;
     displacement.clone = clone;
+    displacement.matching_noise += (options.older_inflation - 1.0) * displacement.covariance();
     const Innovation innovation = filter_->innovation(displacement);
     if (innovation.nis(displacement.observable * slack * displacement.observable.transpose()) > gate(displacement))
       continue;

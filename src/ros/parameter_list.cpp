@@ -155,6 +155,7 @@ List estimationParameters(PipelineOptions& pipeline) {
       number("older_dist_angular", reference.older_dist_angular, aboveUpTo(0.0, 100.0), "rad"),
       number("older_min_overlap", reference.older_min_overlap, within(0.0, 1.0)),
       number("older_std_translation", reference.older_std_translation, within(0.0, 100.0), "m"),
+      number("older_inflation", reference.older_inflation, within(1.0, 1000.0)),
       number("older_std_yaw", reference.older_std_yaw, within(0.0, 100.0), "rad"),
       number("gate_probability", gate.probability, strictlyWithin(0.0, 1.0)),
       flag("trust_scans_on_slip", gate.trust_scans_on_slip),
@@ -190,6 +191,7 @@ List matcherParameters(MatcherOptions& matcher) {
   return {
       number("icp_pair_distance", matcher.icp_pair_distance, aboveUpTo(0.0, 1000.0), "m"),
       number("max_iterations", matcher.max_iterations, within(1, 1000)),
+      flag("match_both_ways", matcher.both_ways),
       number("prior_std_translation", matcher.prior_std_translation, aboveUpTo(0.0, 100.0), "m"),
       number("prior_std_yaw", matcher.prior_std_yaw, aboveUpTo(0.0, 100.0), "rad"),
       number("search_below_overlap", matcher.search_below_overlap, within(0.0, 1.0)),

@@ -24,10 +24,11 @@ DisplacementPrediction prediction(const SE2& truth, const Eigen::Vector3d& offse
 }
 
 Match matchIn(const World& world, const SE2& world_from_reference, const SE2& displacement, const SimulatedLaser& laser,
-              const DisplacementPrediction& expected, std::mt19937_64* random = nullptr) {
+              const DisplacementPrediction& expected, std::mt19937_64* random = nullptr,
+              const MatcherOptions& options = {}) {
   const auto reference = prepare(simulateScan(world, world_from_reference, laser, random), laser);
   const auto current = prepare(simulateScan(world, compose(world_from_reference, displacement), laser, random), laser);
-  return ScanMatcher(MatcherOptions()).match(*reference, *current, expected);
+  return ScanMatcher(options).match(*reference, *current, expected);
 }
 
 const SE2 kDisplacement(0.4, -0.1, 0.2);
@@ -168,7 +169,8 @@ struct MonteCarlo {
   int failures = 0;
 };
 
-MonteCarlo monteCarlo(const World& world, const SE2& displacement, double noise, int runs, Eigen::Index dimension) {
+MonteCarlo monteCarlo(const World& world, const SE2& displacement, double noise, int runs, Eigen::Index dimension,
+                      const MatcherOptions& options = {}) {
   std::mt19937_64 random(7);
   SimulatedLaser laser;
   laser.noise = noise;
@@ -179,7 +181,7 @@ MonteCarlo monteCarlo(const World& world, const SE2& displacement, double noise,
                     Eigen::VectorXd::Zero(dimension)};
   int used = 0;
   for (int run = 0; run < runs; ++run) {
-    const Match match = matchIn(world, SE2(), displacement, laser, prediction(displacement), &random);
+    const Match match = matchIn(world, SE2(), displacement, laser, prediction(displacement), &random, options);
     if (!match.displacement || match.displacement->dimension() != dimension) {
       ++result.failures;
       continue;
@@ -207,6 +209,105 @@ TEST(Covariance, AgreesWithMonteCarloInARoom) {
                                  << ", seen " << std::sqrt(result.sample(axis, axis));
     EXPECT_LT(std::abs(result.mean(axis)), std::sqrt(result.sample(axis, axis))) << "bias of axis " << axis;
   }
+}
+
+/// Of the scans of one pair, matched each way.
+Displacement someDisplacement(const SE2& displacement, const Eigen::Matrix3d& observable, double slope) {
+  Displacement z;
+  z.reference_from_current = displacement;
+  z.observable = observable;
+  z.J_reference = Eigen::Vector3d(slope, 0.0, 0.1);
+  z.J_current = (Eigen::Matrix<double, 3, 2>() << 0.0, slope, 0.2, 0.0, 0.0, 0.3).finished();
+  z.variance_reference = Eigen::VectorXd::Constant(1, 1e-4);
+  z.variance_current = Eigen::VectorXd::Constant(2, 4e-4);
+  z.matching_noise = 1e-4 * Eigen::Matrix3d::Identity();
+  return z;
+}
+
+TEST(BothWays, TheMeanOfTwoThatAgreeIsEither) {
+  const Displacement there =
+      someDisplacement(SE2(0.3, 0.1, 0.2), Eigen::Vector3d(1.0, 2.0, 3.0).asDiagonal().toDenseMatrix(), 0.5);
+  // The same error the other way round: by the inverse's Jacobian, in coordinates of its own.
+  Displacement back = there;
+  Eigen::Matrix3d J;
+  back.reference_from_current = inverse(there.reference_from_current, &J);
+  back.observable << 1.0, 0.2, 0.0, 0.0, 0.5, 0.0, 0.1, 0.0, 2.0;
+  const Eigen::Matrix3d by_there = Eigen::Matrix3d(back.observable) * J * Eigen::Matrix3d(there.observable).inverse();
+  back.J_reference = by_there * there.J_current;
+  back.J_current = by_there * there.J_reference;
+  back.matching_noise = by_there * there.matching_noise * by_there.transpose();
+  std::swap(back.variance_reference, back.variance_current);
+  const Displacement mean = meanOfBothWays(there, back);
+  EXPECT_LT(error(mean.reference_from_current, there.reference_from_current).norm(), 1e-12);
+  EXPECT_LT((mean.J_reference - there.J_reference).norm(), 1e-12) << mean.J_reference;
+  EXPECT_LT((mean.J_current - there.J_current).norm(), 1e-12) << mean.J_current;
+  EXPECT_LT((mean.matching_noise - there.matching_noise).norm(), 1e-12) << mean.matching_noise;
+  EXPECT_LT((mean.covariance() - there.covariance()).norm(), 1e-12) << mean.covariance();
+}
+
+TEST(BothWays, HalfOfWhatTheyDifferByIsNoise) {
+  const Displacement there = someDisplacement(SE2(0.3, 0.0, 0.0), Eigen::Matrix3d::Identity(), 0.5);
+  Displacement back = someDisplacement(SE2(-0.34, 0.02, 0.0), Eigen::Matrix3d::Identity(), 0.5);
+  back.J_current = Eigen::Vector3d(0.7, 0.0, 0.0);
+  back.J_reference = Eigen::MatrixXd::Zero(3, 2);
+  const Displacement mean = meanOfBothWays(there, back);
+  EXPECT_LT(error(mean.reference_from_current, SE2(0.32, -0.01, 0.0)).norm(), 1e-12);
+  EXPECT_NEAR(mean.J_reference(0, 0), 0.5 * (0.5 - 0.7), 1e-12) << "⊖ turns the sign";
+  const Eigen::Vector3d half(0.02, -0.01, 0.0);
+  // ⊖ moves y by x times yaw: the noise of back's yaw is in y.
+  Eigen::Matrix3d expected = 1e-4 * Eigen::Matrix3d::Identity() + half * half.transpose();
+  Eigen::Matrix3d J;
+  inverse(back.reference_from_current, &J);
+  expected += 0.5e-4 * (J * J.transpose() - Eigen::Matrix3d::Identity());
+  EXPECT_LT((mean.matching_noise - expected).norm(), 1e-12) << mean.matching_noise << "\nexpected\n" << expected;
+}
+
+/// Walls of plaster and shelves: steps of some centimetres every few centimetres.
+World rough(const World& smooth, double roughness) {
+  constexpr double kStep = 0.1;  // [m]
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> gauss(0.0, roughness);
+  World world;
+  for (const Wall& wall : smooth) {
+    const Eigen::Vector2d way = wall.to - wall.from;
+    const Eigen::Vector2d across = quarterTurn(way.normalized());
+    const int steps = std::max(1, static_cast<int>(way.norm() / kStep));
+    Eigen::Vector2d from = wall.from;
+    for (int i = 1; i <= steps; ++i) {
+      const Eigen::Vector2d to = wall.from + way * i / steps + gauss(random) * across;
+      world.push_back({from, to});
+      from = to;
+    }
+  }
+  return world;
+}
+
+TEST(BothWays, ErrLessThanOneAmongRoughWalls) {
+  const World world = rough(room(), 0.03);
+  SimulatedLaser laser;
+  laser.beams = 181;
+  laser.angle_increment = 2.0 * M_PI / 181.0;
+  laser.noise = 0.02;
+  MatcherOptions one_way;
+  one_way.both_ways = false;
+  Eigen::Vector3d both = Eigen::Vector3d::Zero();
+  Eigen::Vector3d one = Eigen::Vector3d::Zero();
+  for (int i = 0; i < 150; ++i) {
+    std::mt19937_64 random(static_cast<std::uint64_t>(i));
+    std::uniform_real_distribution<double> within(-1.0, 1.0);
+    const SE2 start(within(random), within(random), 3.0 * within(random));
+    const SE2 motion(0.5 * within(random), 0.1 * within(random), 0.4 * within(random));
+    std::mt19937_64 again = random;
+    const Match a = matchIn(world, start, motion, laser, prediction(motion), &random);
+    const Match b = matchIn(world, start, motion, laser, prediction(motion), &again, one_way);
+    ASSERT_TRUE(a.displacement && b.displacement) << i;
+    both += error(a.displacement->reference_from_current, motion).cwiseAbs2();
+    one += error(b.displacement->reference_from_current, motion).cwiseAbs2();
+  }
+  const Eigen::Vector3d ratio = both.cwiseQuotient(one);
+  EXPECT_LT(ratio.head<2>().maxCoeff(), 0.8)
+      << "mean square errors in x, y, yaw, both ways over one: " << ratio.transpose();
+  EXPECT_LT(ratio.z(), 1.05);
 }
 
 TEST(Covariance, AgreesWithMonteCarloAcrossACorridor) {

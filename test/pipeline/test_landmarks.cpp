@@ -296,8 +296,13 @@ TEST(Landmarks, OnALoopTheSecondPassFallsOnTheFirst) {
   drive.laser.range_max = 8.0;
   PipelineOptions with_them = with("corners");
   PipelineOptions without;
-  // References of so short a way that none is kept when the robot comes by again.
-  with_them.reference.kept = without.reference.kept = 4;
+  for (PipelineOptions* options : {&with_them, &without}) {
+    options->reference.kept = 4;  // of so short a way that none is kept when the robot comes by again
+    // So that there is a drift to be taken back.
+    options->matcher.both_ways = false;
+    options->reference.older_compared = 2;
+    options->reference.older_inflation = 1.0;
+  }
   Driven landmarks(drive, with_them);
   landmarks.odometry(0);
   landmarks.run(0, 80000);

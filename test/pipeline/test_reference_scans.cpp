@@ -131,5 +131,22 @@ TEST(ScanOdometry, OlderReferencesHoldTheEstimate) {
   EXPECT_LT(drift[1], 0.8 * drift[0]) << "mean error in metres, with " << drift[1] << " and without " << drift[0];
 }
 
+/// Displacements of one scan err alike in part: the more is allowed for it, the less certain the estimate.
+TEST(ScanOdometry, WhatDisplacementsHaveInCommonIsAllowedFor) {
+  const SimulatedDrive drive(Wheels(), 26000);
+  double grown[2];
+  for (const bool allowed : {false, true}) {
+    PipelineOptions options;
+    options.reference.kept = 4;  // so that the start, which is known exactly, is forgotten
+    options.reference.older_inflation = allowed ? 4.0 : 1.0;
+    Driven driven(drive, options);
+    driven.odometry(0);
+    driven.run(0, 25000);
+    const auto yaw_variance = [](const ScanReport& report) { return report.estimate->covariance(2, 2); };
+    grown[allowed ? 1 : 0] = yaw_variance(driven.reports.back()) - yaw_variance(driven.reports.front());
+  }
+  EXPECT_GT(grown[1], 1.5 * grown[0]) << "variance of yaw, with " << grown[1] << ", without " << grown[0] << " rad²";
+}
+
 }  // namespace
 }  // namespace sckf::test

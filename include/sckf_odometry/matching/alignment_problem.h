@@ -49,6 +49,13 @@ struct Residual {
   double std = 1.0;                  ///< σ [m]
 };
 
+/// A displacement that is applied to many points: its sine and cosine taken once.
+struct RigidMotion {
+  explicit RigidMotion(const SE2& x) : C(x.rotation()), t(x.translation()) {}
+  Eigen::Matrix2d C;
+  Eigen::Vector2d t;  ///< [m]
+};
+
 /// Everything that one residual has to tell at a displacement.
 struct ResidualTerms {
   double e;                ///< the residual, in units of its std
@@ -84,7 +91,7 @@ class AlignmentProblem {
   /// Share of the points of the current scan that have a partner.
   double overlap() const;
 
-  ResidualTerms terms(const Residual& residual, const SE2& reference_from_current) const;
+  ResidualTerms terms(const Residual& residual, const RigidMotion& reference_from_current) const;
 
   /// ∂A by the angle of the residual's normal.
   static Eigen::Vector3d derivativeByNormal(const Residual& residual, const ResidualTerms& terms);
@@ -95,9 +102,9 @@ class AlignmentProblem {
   double cost(const SE2& reference_from_current) const;
 
  private:
-  void addSurfacePair(const Pair& pair, const SE2& reference_from_current, const PairOptions& options);
+  void addSurfacePair(const Pair& pair, const RigidMotion& reference_from_current, const PairOptions& options);
   void addPointPair(const Pair& pair, const PairOptions& options);
-  void fitKernel(const SE2& reference_from_current, const PairOptions& options);
+  void fitKernel(const RigidMotion& reference_from_current, const PairOptions& options);
 
   const PreparedScan& reference_;
   const PreparedScan& current_;

@@ -16,6 +16,7 @@ namespace sckf {
 struct MatcherOptions {
   double icp_pair_distance = 0.5;       ///< [m] CICP pairs points up to this distance at its start
   int max_iterations = 15;              ///< of the alignment after CICP
+  bool both_ways = true;                ///< match the reference with the current scan, too, and take the mean
   double prior_std_translation = 0.05;  ///< [m] added to the prediction's std of x and y, for the pairing of points
   double prior_std_yaw = 0.05;          ///< [rad] … and to its std of yaw
   double search_below_overlap = 0.7;    ///< more start yaws are tried if a smaller share of the points has a partner
