@@ -9,6 +9,7 @@ import unittest
 
 import numpy as np
 import rospy
+import yaml
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
@@ -115,6 +116,15 @@ class Example(unittest.TestCase):
         self.assertEqual(roots, {'map' if self.robot.map else 'odom'})
         self.assertLessEqual({self.robot.odom_frame, self.robot.base_frame, 'laser'}, set(parent) | roots)
 
+    def test_the_example_has_the_laser_where_it_is(self):
+        mounts = [each.transform for each in self.recorder.transforms() if each.child_frame_id == 'laser']
+        self.assertTrue(mounts)
+        for mount in mounts:
+            yaw = 2.0 * math.atan2(mount.rotation.z, mount.rotation.w)
+            self.assertAlmostEqual(mount.translation.x, self.robot.mount.x, msg=mounts)
+            self.assertAlmostEqual(mount.translation.y, 0.0, msg=mounts)
+            self.assertAlmostEqual(yaw, 0.0, msg=mounts)
+
     def test_no_stamp_comes_twice_on_tf(self):
         stamps = collections.defaultdict(list)
         for transform in self.recorder.transforms(static=False):
@@ -147,6 +157,16 @@ class Example(unittest.TestCase):
     def test_there_is_nothing_to_warn_of(self):
         for part in ('unknown parameter', 'a frame can have one parent only'):
             self.assertEqual(self.recorder.log(part), [])
+
+    def test_who_comes_after_it_asks_for_its_frames(self):
+        frames = {'amcl': ('/amcl/odom_frame_id', '/amcl/base_frame_id'),
+                  'gmapping': ('/slam_gmapping/odom_frame', '/slam_gmapping/base_frame')}
+        if self.name not in frames:
+            self.skipTest('starts nobody that comes after it')
+        dumped = subprocess.run(['roslaunch', '--dump-params', 'sckf_odometry', self.name + '.launch'],
+                                stdout=subprocess.PIPE, universal_newlines=True, check=True).stdout
+        parameters = yaml.safe_load(dumped)
+        self.assertEqual([parameters[name] for name in frames[self.name]], [self.robot.odom_frame, self.robot.base_frame])
 
     def test_as_a_user_calls_it_it_starts_what_it_says(self):
         nodes = subprocess.run(['roslaunch', '--nodes', 'sckf_odometry', self.name + '.launch'], stdout=subprocess.PIPE,
