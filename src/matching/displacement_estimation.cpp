@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "sckf_odometry/core/covariance.h"
 #include "sckf_odometry/matching/line_fit.h"
@@ -30,7 +31,13 @@ SE2 minimise(const AlignmentProblem& problem, SE2 x, const ObservableDirections&
   return x;
 }
 
-/// Second derivatives of the loss at the solution, by the displacement and by the ranges.
+/// The part of the loss that neighbouring beams of the current scan have, which may err together.
+struct BeamBlock {
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
+};
+
+/// Derivatives of the loss at the solution, by the displacement and by the ranges.
 struct LossDerivatives {
   explicit LossDerivatives(const AlignmentProblem& problem)
       : by_reference(Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(problem.reference().beams))),
@@ -39,8 +46,7 @@ struct LossDerivatives {
   Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();  // ∂²L/∂x²
   Eigen::Matrix3Xd by_reference;                      // ∂²L/∂x∂z_k, 3 × M_k
   Eigen::Matrix3Xd by_current;                        // ∂²L/∂x∂z_{k+m}, 3 × M_{k+m}
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();  // Σ over blocks of beams of g gᵀ, g the gradient of a block
-  int blocks = 0;
+  std::vector<BeamBlock> blocks;                      // of which the hessian is the sum
   double loss_weight = 0.0;
   double loss_square = 0.0;
 };
@@ -64,8 +70,11 @@ void addDerivatives(const AlignmentProblem& problem, const Residual& residual, c
                     const ResidualTerms& t, LossDerivatives& out) {
   const double influence = problem.kernel().influence(t.e);
   const double slope = problem.kernel().slope(t.e);
-  out.hessian += slope * t.A * t.A.transpose();
-  out.hessian(2, 2) -= influence / residual.std * residual.normal.dot(t.lever);
+  Eigen::Matrix3d hessian = slope * t.A * t.A.transpose();
+  hessian(2, 2) -= influence / residual.std * residual.normal.dot(t.lever);
+  out.hessian += hessian;
+  out.blocks.back().hessian += hessian;
+  out.blocks.back().gradient += influence * t.A;
 
   const ScannedPoints& current = problem.current().points;
   const auto c = static_cast<std::size_t>(residual.current);
@@ -85,38 +94,45 @@ void addDerivatives(const AlignmentProblem& problem, const Residual& residual, c
 
 LossDerivatives differentiate(const AlignmentProblem& problem, const RigidMotion& x, const EstimationOptions& options) {
   LossDerivatives out(problem);
-  Eigen::Vector3d block_gradient = Eigen::Vector3d::Zero();
-  int block = -1;
+  int block = 0;
   for (const Residual& residual : problem.residuals()) {
+    const int beam = problem.current().points.beam[static_cast<std::size_t>(residual.current)];
+    const int its_block = beam / options.correlated_beams;
+    if (out.blocks.empty() || its_block != block) out.blocks.emplace_back();
+    block = its_block;
     const ResidualTerms t = problem.terms(residual, x);
     addDerivatives(problem, residual, x, t, out);
     const double w = problem.kernel().weight(t.e);
     out.loss_weight += w;
     out.loss_square += w * t.e * t.e;
-    const int its_block =
-        problem.current().points.beam[static_cast<std::size_t>(residual.current)] / options.correlated_beams;
-    if (its_block != block) {
-      out.scatter += block_gradient * block_gradient.transpose();
-      block_gradient.setZero();
-      block = its_block;
-      ++out.blocks;
-    }
-    block_gradient += w * t.e * t.A;
   }
-  out.scatter += block_gradient * block_gradient.transpose();
   return out;
 }
 
-/// R_n: by how much the residuals scatter beyond what range noise explains, as a covariance of the displacement. Range
-/// noise gives R_z; the gradients of blocks of neighbouring beams give what is seen, as a variance is seen in so many
-/// samples: to √(2/blocks). Only what exceeds both is matching noise.
-MatrixDD matchingNoise(const MatrixDD& range_covariance, const MatrixDD& seen_covariance, int blocks) {
+/// The covariance of the displacement that the residuals show by themselves: how far it moves when one block of beams
+/// after the other is left out (jackknife). The plain scatter of the gradients would be too small, since a block with
+/// much weight pulls the solution towards itself; and how beams of one block are correlated does not matter.
+MatrixDD seenCovariance(const LossDerivatives& loss, const ObservableDirections& seen, const MatrixDD& hessian) {
+  constexpr double kLeftOut = 0.9;  // not all of it: without a block the rest may not tell of a direction
+  MatrixDD covariance = MatrixDD::Zero(seen.dimension(), seen.dimension());
+  for (const BeamBlock& block : loss.blocks) {
+    const MatrixDD rest = hessian - kLeftOut * (seen.basis.transpose() * block.hessian * seen.basis);
+    const Eigen::VectorXd moved = rest.ldlt().solve(seen.basis.transpose() * block.gradient);
+    covariance += moved * moved.transpose();
+  }
+  return covariance;
+}
+
+/// R_n: what is seen beyond what range noise explains. A variance is seen in so many samples to √(2/blocks); only what
+/// exceeds both is matching noise.
+MatrixDD matchingNoise(const MatrixDD& range_covariance, const MatrixDD& seen_covariance, std::size_t blocks) {
   const Eigen::LLT<MatrixDD> range(range_covariance);
   const MatrixDD L = range.matrixL();
   MatrixDD whitened = range.matrixL().solve(seen_covariance);
   whitened = range.matrixL().solve(whitened.transpose()).eval();
   const Eigen::SelfAdjointEigenSolver<MatrixDD> eigen(symmetric(whitened));
-  const Eigen::VectorXd excess = (eigen.eigenvalues().array() - 1.0 - std::sqrt(2.0 / blocks)).max(0.0);
+  const double explained = 1.0 + std::sqrt(2.0 / static_cast<double>(blocks));
+  const Eigen::VectorXd excess = (eigen.eigenvalues().array() - explained).max(0.0);
   const MatrixDD half = L * eigen.eigenvectors();
   return half * excess.asDiagonal() * half.transpose();
 }
@@ -141,7 +157,7 @@ std::optional<DisplacementEstimate> estimateDisplacement(const AlignmentProblem&
   z.variance_reference = problem.reference().rangeVariances();
   z.variance_current = problem.current().rangeVariances();
   z.matching_noise = MatrixDD::Zero(seen.dimension(), seen.dimension());
-  z.matching_noise = matchingNoise(z.covariance(), implicit * loss.scatter * implicit.transpose(), loss.blocks);
+  z.matching_noise = matchingNoise(z.covariance(), seenCovariance(loss, seen, hessian), loss.blocks.size());
   estimate.residual_rms = std::sqrt(loss.loss_square / loss.loss_weight);
   return estimate;
 }

@@ -91,35 +91,51 @@ void writeTumLine(OutputFile& file, Stamp stamp, const SE2& pose) {
 void writeCsvHeader(OutputFile& file) {
   file.print(
       "stamp,x,y,yaw,var_x,cov_xy,cov_xyaw,var_y,cov_yyaw,var_yaw,"
-      "reference_stamp,displacement_x,displacement_y,displacement_yaw,dimension,"
-      "innovation_1,innovation_2,innovation_3,nis,pairs,overlap,residual_rms,new_reference,outcome,reason\n");
+      "reference_stamp,predicted_x,predicted_y,predicted_yaw,displacement_x,displacement_y,displacement_yaw,dimension,"
+      "displacement_var_x,displacement_cov_xy,displacement_cov_xyaw,displacement_var_y,displacement_cov_yyaw,"
+      "displacement_var_yaw,innovation_1,innovation_2,innovation_3,nis,pairs,overlap,residual_rms,new_reference,outcome,reason\n");
+}
+
+void writePose(OutputFile& file, const SE2& pose) { file.print(",%.9f,%.9f,%.9f", pose.x, pose.y, pose.yaw); }
+
+void writeCovariance(OutputFile& file, const Eigen::Matrix3d& P) {
+  file.print(",%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", P(0, 0), P(0, 1), P(0, 2), P(1, 1), P(1, 2), P(2, 2));
+}
+
+void writeEmpty(OutputFile& file, Eigen::Index columns) {
+  for (Eigen::Index i = 0; i < columns; ++i) file.print(",");
+}
+
+/// Its covariance by x, y, yaw only where all of them are seen.
+void writeDisplacement(OutputFile& file, const ScanReport& report) {
+  const Displacement& z = *report.match.displacement;
+  file.print(",%s", decimal(report.reference_stamp).c_str());
+  writePose(file, report.prediction.reference_from_current);
+  writePose(file, z.reference_from_current);
+  file.print(",%d", static_cast<int>(z.dimension()));
+  if (z.dimension() == 3) {
+    const Eigen::Matrix3d by_pose = Eigen::Matrix3d(z.observable).inverse();
+    writeCovariance(file, by_pose * z.covariance() * by_pose.transpose());
+  } else {
+    writeEmpty(file, 6);
+  }
+  for (Eigen::Index i = 0; i < z.dimension(); ++i) file.print(",%.9g", report.innovation->residual(i));
+  writeEmpty(file, 3 - z.dimension());
+  file.print(",%.9g", report.innovation->nis());
 }
 
 void writeCsvLine(OutputFile& file, const ScanReport& report) {
   file.print("%s", decimal(report.stamp).c_str());
   if (report.estimate) {
-    const SE2& pose = report.estimate->odom_from_base;
-    const Eigen::Matrix3d& P = report.estimate->covariance;
-    file.print(",%.9f,%.9f,%.9f,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", pose.x, pose.y, pose.yaw, P(0, 0), P(0, 1), P(0, 2),
-               P(1, 1), P(1, 2), P(2, 2));
+    writePose(file, report.estimate->odom_from_base);
+    writeCovariance(file, report.estimate->covariance);
   } else {
-    file.print(",,,,,,,,,");
+    writeEmpty(file, 9);
   }
   if (report.innovation) {
-    const Displacement& z = *report.match.displacement;
-    const SE2& displacement = z.reference_from_current;
-    file.print(",%s,%.9f,%.9f,%.9f,%d", decimal(report.reference_stamp).c_str(), displacement.x, displacement.y,
-               displacement.yaw, static_cast<int>(z.dimension()));
-    for (Eigen::Index i = 0; i < 3; ++i) {
-      if (i < z.dimension()) {
-        file.print(",%.9g", report.innovation->residual(i));
-      } else {
-        file.print(",");
-      }
-    }
-    file.print(",%.9g", report.innovation->nis());
+    writeDisplacement(file, report);
   } else {
-    file.print(",,,,,,,,,");
+    writeEmpty(file, 18);
   }
   file.print(",%zu,%.6f,%.6f,%d,%s,\"%s\"\n", report.match.pairs.size(), report.match.overlap,
              report.match.residual_rms, report.new_reference ? 1 : 0, toString(report.outcome).c_str(),

@@ -315,8 +315,10 @@ TEST(Covariance, AgreesWithMonteCarloAcrossACorridor) {
   EXPECT_EQ(result.failures, 0) << "matches that did not come out with two directions";
   for (int axis = 0; axis < 2; ++axis) {
     const double ratio = std::sqrt(result.claimed(axis, axis) / result.sample(axis, axis));
-    EXPECT_NEAR(ratio, 1.0, 0.2) << "axis " << axis << ", claimed std " << std::sqrt(result.claimed(axis, axis))
-                                 << ", seen " << std::sqrt(result.sample(axis, axis));
+    // Rather too large than too small: a block of beams at the end of the view weighs much.
+    EXPECT_GT(ratio, 0.85) << "axis " << axis << ", claimed std " << std::sqrt(result.claimed(axis, axis)) << ", seen "
+                           << std::sqrt(result.sample(axis, axis));
+    EXPECT_LT(ratio, 1.25) << "axis " << axis;
   }
 }
 

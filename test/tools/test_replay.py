@@ -26,8 +26,9 @@ from trajectory import Trajectory, between, read_tum  # noqa: E402
 REPLAY = Path(os.environ.get("SCKF_BIN_DIR", ROOT / "build" / "devel" / "lib" / "sckf_odometry")) / "replay"
 DURATION = 12.0
 COLUMNS = ("stamp,x,y,yaw,var_x,cov_xy,cov_xyaw,var_y,cov_yyaw,var_yaw,"
-           "reference_stamp,displacement_x,displacement_y,displacement_yaw,dimension,"
-           "innovation_1,innovation_2,innovation_3,nis,pairs,overlap,residual_rms,new_reference,outcome,reason").split(",")
+           "reference_stamp,predicted_x,predicted_y,predicted_yaw,displacement_x,displacement_y,displacement_yaw,dimension,"
+           "displacement_var_x,displacement_cov_xy,displacement_cov_xyaw,displacement_var_y,displacement_cov_yyaw,"
+           "displacement_var_yaw,innovation_1,innovation_2,innovation_3,nis,pairs,overlap,residual_rms,new_reference,outcome,reason").split(",")
 
 
 class ReplayTest(unittest.TestCase):
@@ -129,7 +130,7 @@ class ReplayTest(unittest.TestCase):
             self.assertGreaterEqual(float(row["nis"]), 0.0)
             self.assertGreater(int(row["pairs"]), 100)
             self.assertTrue(0.5 < float(row["overlap"]) <= 1.0, row["overlap"])
-            for name in COLUMNS[11:19]:
+            for name in COLUMNS[11:28]:
                 self.assertTrue(math.isfinite(float(row[name])), name)
 
     def test_twice_the_same_bag_gives_the_same_bytes(self) -> None:

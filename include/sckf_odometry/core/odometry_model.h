@@ -24,8 +24,8 @@ namespace sckf {
 /// For the last two Q = ∫ G W Gᵀ along the arc that the motion is, where W is what is added at a point and
 /// G = [C(φ) J (t_end − t); 0 1] carries it to the end. So it does not depend on how the arc is sliced.
 struct OdometryNoise {
-  double translation_per_meter = 0.10;    ///< std of x and y after 1 m of way [m/√m]
-  double translation_per_radian = 0.08;   ///< std of x and y after 1 rad of rotation [m/√rad]
+  double translation_per_meter = 0.05;    ///< std of x and y after 1 m of way [m/√m]
+  double translation_per_radian = 0.04;   ///< std of x and y after 1 rad of rotation [m/√rad]
   double yaw_per_meter = 0.10;            ///< std of yaw after 1 m of way [rad/√m]
   double yaw_per_radian = 0.15;           ///< std of yaw after 1 rad of rotation [rad/√rad]
   double lateral_share = 0.2;             ///< q: std to the left over that ahead; of no effect where omnidirectional

@@ -11,7 +11,7 @@ namespace sckf {
 
 struct EstimationOptions {
   ObservabilityOptions observability;
-  int correlated_beams = 10;  ///< residuals of this many neighbouring beams may err together
+  int correlated_beams = 15;  ///< residuals of this many neighbouring beams may err together
 };
 
 struct DisplacementEstimate {
