@@ -79,8 +79,9 @@ void switchOthersOn(PipelineOptions& options, Bytes& bytes) {
   options.imu.orientation = can && bytes.chance();
   options.pose_updates.on = can && bytes.chance();
   options.standstill.time = can ? 0.2 * bytes.upTo(2) : 0.0;
-  const auto use = static_cast<std::size_t>(bytes.upTo(2));
+  const auto use = static_cast<std::size_t>(bytes.upTo(3));
   options.landmarks.use = can && !options.pose_updates.on ? landmarkUses()[use] : "none";
+  options.landmarks.only = options.landmarks.on() && bytes.chance();
 }
 
 PipelineOptions options(Bytes& bytes) {

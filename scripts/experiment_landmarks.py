@@ -2,24 +2,38 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Dict
+from typing import Dict, NamedTuple
 
 import numpy as np
 
-from experiment_base import GREEN, GREY, WITH, Result, Setting, markdown_table, new_figure, paragraph, run, save_figure
+from experiment_base import (GREEN, GREY, WITH, WITHOUT, Result, Setting, markdown_table, new_figure, paragraph, run,
+                             save_figure)
 from experiment_logs import Estimates, end_error, last_revisit, log_bag, read_estimates
 from recording import Topics, read_recording
 from trajectory import Trajectory, drift, read_tum, sample
 
-# The value of ~landmarks, and what it stands for.
-MODES = {"none": "displacements", "corners_only": "landmarks", "corners": "both"}
-COLOURS = {"none": WITH, "corners_only": GREY, "corners": GREEN}
+
+class Mode(NamedTuple):
+    """Which landmarks, and how they are drawn."""
+    name: str
+    landmarks: str
+    only: bool
+    colour: str
+    style: str
+
+
+MODES = {"none": Mode("displacements", "none", False, WITH, "-"),
+         "only": Mode("landmarks", "corners_and_lines", True, GREY, ":"),
+         "corners": Mode("both, corners", "corners", False, GREEN, "--"),
+         "lines": Mode("both, lines", "lines", False, WITHOUT, "-."),
+         "corners_and_lines": Mode("both, corners and lines", "corners_and_lines", False, "black", ":")}
 
 
 def replay_with(setting: Setting, bag: Path, mode: str) -> Estimates:
     params = setting.output / f"landmarks_{mode}.yaml"
     # Alone they have to be found again from where the wheels lead.
-    params.write_text(f"landmarks: {mode}\n" + ("landmark_max_std: 0.5\n" if mode == "corners_only" else ""))
+    alone = "landmarks_only: true\nlandmark_max_std: 0.5\n" if MODES[mode].only else ""
+    params.write_text(f"landmarks: {MODES[mode].landmarks}\n{alone}")
     csv = setting.output / f"landmarks_{mode}.csv"
     run(setting, "replay", [bag, "--params", params, "--csv", csv, "--trajectory", csv.with_suffix(".tum"),
                             "--scan-topic", setting.scan_topic, "--odom-topic", setting.odom_topic])
@@ -40,18 +54,18 @@ def rms_after_alignment(reference: Trajectory, estimate: Trajectory) -> float:
 def landmarks(setting: Setting) -> Result:
     bag = log_bag(setting)
     estimates = {mode: replay_with(setting, bag, mode) for mode in MODES}
-    result = Result("landmarks", "corners as landmarks in the state (`landmarks`)",
+    result = Result("landmarks", "corners and lines as landmarks in the state (`landmarks`)",
                     figures=[_draw(setting, estimates)])
     columns = _at_the_revisit(setting, bag, estimates, result)
     if setting.reference:
         columns.update(_against_reference(read_tum(setting.reference), estimates, result))
-    rows = [[name, *(column[mode] for column in columns.values())] for mode, name in MODES.items()]
+    rows = [[mode.name, *(column[key] for column in columns.values())] for key, mode in MODES.items()]
     result.text = [
         paragraph(f"""
-            Log: `{bag.name}`. The same scans by displacements only, by landmarks only, and by both, where what a corner
-            is made of is taken out of the scans that are matched. The drift over short segments says how well the
-            pose goes on from where it is; a landmark that is seen again takes back what has come together since, in
-            a step, which the drift counts as an error and the whole trajectory as none."""),
+            Log: `{bag.name}`. The same scans by displacements only, by landmarks only (corners and lines), and by
+            both, where what a landmark is made of is taken out of the scans that are matched. The drift over short
+            segments says how well the pose goes on from where it is; a landmark that is seen again takes back what has
+            come together since, in a step, which the drift counts as an error and the whole trajectory as none."""),
         markdown_table(["", *columns], rows)]
     return result
 
@@ -82,9 +96,9 @@ def _against_reference(reference: Trajectory, estimates: Dict[str, Estimates],
 
 def _draw(setting: Setting, estimates: Dict[str, Estimates]) -> str:
     figure, ((panel,),) = new_figure(1, 1, 8.0, 6.0)
-    for (mode, name), style in zip(MODES.items(), ("-", ":", "--")):
-        path = estimates[mode].poses
-        panel.plot(path[:, 0], path[:, 1], style, color=COLOURS[mode], linewidth=1.8, label=name)
+    for key, mode in MODES.items():
+        path = estimates[key].poses
+        panel.plot(path[:, 0], path[:, 1], mode.style, color=mode.colour, linewidth=1.8, label=mode.name)
     panel.set(xlabel="x [m]", ylabel="y [m]")
     panel.set_aspect("equal")
     panel.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0))

@@ -37,34 +37,13 @@ class CornerSearch {
 
   /// Splits the stretch where it bends; a wall between two bends is shared out in the middle.
   void searchStretch(int begin, int end) {
-    std::vector<int> bends;
-    split(begin, end, bends);
-    for (std::size_t k = 0; k < bends.size(); ++k) {
-      const int from = k > 0 ? (bends[k - 1] + bends[k]) / 2 + 1 : begin;
-      const int to = k + 1 < bends.size() ? (bends[k] + bends[k + 1]) / 2 : end;
-      if (const auto corner = cornerAt(bends[k], from, to)) corners_.push_back(*corner);
-    }
-  }
-
-  /// The points between begin and end at which the stretch bends (iterative end point fit).
-  void split(int begin, int end, std::vector<int>& bends) const {
     const double most = 3.0 * std::hypot(scan_.range_noise, options_.roughness);
-    const Eigen::Vector2d along = point(end) - point(begin);
-    const bool is_ring = along.norm() <= most;  // which has no direction
-    const Eigen::Vector2d normal = quarterTurn(along).normalized();
-    int farthest = begin;
-    double distance = most;
-    for (int i = begin + 1; i < end; ++i) {
-      const Eigen::Vector2d d = point(i) - point(begin);
-      const double off = is_ring ? d.norm() : std::abs(normal.dot(d));
-      if (off <= distance) continue;
-      distance = off;
-      farthest = i;
+    const std::vector<int> at = bends(points_.point, begin, end, most);
+    for (std::size_t k = 0; k < at.size(); ++k) {
+      const int from = k > 0 ? (at[k - 1] + at[k]) / 2 + 1 : begin;
+      const int to = k + 1 < at.size() ? (at[k] + at[k + 1]) / 2 : end;
+      if (const auto corner = cornerAt(at[k], from, to)) corners_.push_back(*corner);
     }
-    if (farthest == begin) return;
-    split(begin, farthest, bends);
-    bends.push_back(farthest);
-    split(farthest, end, bends);
   }
 
   /// The corner at the bend between two walls, the points of which lie within [begin, end].

@@ -5,6 +5,30 @@
 
 namespace sckf {
 
+namespace {
+
+void split(const std::vector<Eigen::Vector2d>& points, int begin, int end, double most, std::vector<int>& bends) {
+  const auto point = [&points](int i) -> const Eigen::Vector2d& { return points[static_cast<std::size_t>(i)]; };
+  const Eigen::Vector2d along = point(end) - point(begin);
+  const bool is_ring = along.norm() <= most;  // which has no direction
+  const Eigen::Vector2d normal = quarterTurn(along).normalized();
+  int farthest = begin;
+  double distance = most;
+  for (int i = begin + 1; i < end; ++i) {
+    const Eigen::Vector2d d = point(i) - point(begin);
+    const double off = is_ring ? d.norm() : std::abs(normal.dot(d));
+    if (off <= distance) continue;
+    distance = off;
+    farthest = i;
+  }
+  if (farthest == begin) return;
+  split(points, begin, farthest, most, bends);
+  bends.push_back(farthest);
+  split(points, farthest, end, most, bends);
+}
+
+}  // namespace
+
 LineFits::LineFits(const std::vector<Eigen::Vector2d>& points) : sums_(points.size() + 1, Sums::Zero()) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector2d& p = points[i];
@@ -35,6 +59,12 @@ bool connected(const ScannedPoints& points, std::size_t i, double range_noise, d
   if (beams > kMaxBeams || step >= kGrazing) return false;
   const double reach = points.range[i] * std::sin(step) / std::sin(kGrazing - step);
   return (points.point[i + 1] - points.point[i]).norm() <= reach + 3.0 * range_noise;
+}
+
+std::vector<int> bends(const std::vector<Eigen::Vector2d>& points, int begin, int end, double most) {
+  std::vector<int> bends;
+  split(points, begin, end, most, bends);
+  return bends;
 }
 
 }  // namespace sckf

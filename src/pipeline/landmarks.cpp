@@ -1,9 +1,9 @@
 #include "sckf_odometry/pipeline/landmarks.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "sckf_odometry/pipeline/chi_squared.h"
@@ -13,32 +13,35 @@ namespace sckf {
 
 namespace {
 
-constexpr double kSameAngle = 0.3;     // [rad] between the walls, and of the corner's yaw: corners of a kind
-constexpr double kSamePlace = 0.3;     // [m] within which there is one landmark, and one candidate
 constexpr std::size_t kForgotten = 5;  // scans after which a candidate that is not seen again is none
-
-Sighting sighting(const Corner& corner) { return {corner.base_from_corner, corner.covariance}; }
-
-bool areAlike(const SE2& a, const SE2& b) {
-  const Eigen::Vector3d e = error(a, b);
-  return e.head<2>().norm() < kSamePlace && std::abs(e.z()) < kSameAngle;
-}
 
 double largestStd(const Eigen::Matrix2d& covariance) {
   return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance).eigenvalues()(1));
 }
 
+/// Of where a landmark is expected: of a corner in any direction, of a line across it.
+double stdOf(const Innovation& r) {
+  return r.covariance.rows() == 3 ? largestStd(r.covariance.topLeftCorner<2, 2>()) : std::sqrt(r.covariance(0, 0));
+}
+
 /// What the robot's pose may be off, as an error of what it sees there.
-Eigen::Matrix3d seenFrom(const Eigen::Matrix3d& slack, const SE2& base_from_landmark) {
+Displacement::MatrixDD seenFrom(const Eigen::Matrix3d& slack, const Sighting& sighting) {
   Eigen::Matrix3d J = Eigen::Matrix3d::Identity();
-  J.topRightCorner<2, 1>() = quarterTurn(base_from_landmark.translation());
-  return J * slack * J.transpose();
+  J.topRightCorner<2, 1>() = quarterTurn(sighting.base_from_landmark.translation());
+  const Displacement::MatrixD3 S = sighting.seen() * J;
+  return S * slack * S.transpose();
+}
+
+/// Volume of the ellipsoid of what is seen, squared.
+double uncertainty(const Sighting& sighting) {
+  const Displacement::MatrixD3 S = sighting.seen();
+  return Displacement::MatrixDD(S * sighting.covariance * S.transpose()).determinant();
 }
 
 }  // namespace
 
 const std::vector<std::string>& landmarkUses() {
-  static const std::vector<std::string> uses{"none", "corners", "corners_only"};
+  static const std::vector<std::string> uses{"none", "corners", "lines", "corners_and_lines"};
   return uses;
 }
 
@@ -48,56 +51,83 @@ std::shared_ptr<const PreparedScan> Landmarks::claim(std::shared_ptr<const Prepa
   ++scans_;
   scan_ = std::move(scan);
   sights_.clear();
-  for (Corner& corner : findCorners(*scan_, options_.corner)) sights_.push_back({std::move(corner)});
-  for (const Association& a : compatible(filter, reference, Stage::kClaim)) sights_[a.sight].claimed = true;
-  for (Sight& sight : sights_) {
-    const Candidate* candidate = candidateFor(sight.corner, filter.pose());
-    if (candidate != nullptr && candidate->sightings + 1 >= options_.sightings) sight.claimed = true;
-  }
-  if (options_.withDisplacements()) giveWay(scan_->size());
-
   std::vector<bool> aside(scan_->size(), false);
-  for (const Sight& sight : sights_) {
-    if (!sight.claimed) continue;
-    std::fill(aside.begin() + sight.corner.first, aside.begin() + sight.corner.last + 1, true);
+  if (options_.corners()) {
+    for (const Corner& corner : findCorners(*scan_, options_.corner)) sights_.emplace_back(corner);
+    claim(0, filter, reference, aside);
+  }
+  // Corners come first: they tell all that lines tell, and where along the lines, too.
+  corners_have_ = aside;
+  if (options_.lines()) {
+    const std::size_t corners = sights_.size();
+    for (const Line& line : findLines(*scan_, aside, options_.line)) sights_.emplace_back(line);
+    claim(corners, filter, reference, aside);
   }
   if (std::find(aside.begin(), aside.end(), true) == aside.end()) return scan_;
   return setAside(*scan_, aside, surface);
 }
 
-/// The match needs points, too: the least certain corners leave theirs to it.
-void Landmarks::giveWay(std::size_t points) {
-  std::vector<Sight*> claimed;
-  for (Sight& sight : sights_) {
-    if (sight.claimed) claimed.push_back(&sight);
+/// Of the sights from `first` on those that are, or may become, landmarks; their points are aside then.
+void Landmarks::claim(std::size_t first, const MultiCloneFilter& filter, const ReferenceOptions& reference,
+                      std::vector<bool>& aside) {
+  for (const Association& a : compatible(filter, reference, Stage::kClaim)) {
+    if (a.sight >= first) sights_[a.sight].claimed = true;
   }
-  const auto uncertainty = [](const Sight* sight) { return sight->corner.covariance.determinant(); };
-  std::sort(claimed.begin(), claimed.end(), [&](auto* a, auto* b) { return uncertainty(a) < uncertainty(b); });
-  double left = options_.max_share * static_cast<double>(points);
+  for (std::size_t s = first; s < sights_.size(); ++s) {
+    const Candidate* candidate = candidateFor(moved(filter.pose(), sights_[s].feature()));
+    if (candidate != nullptr && candidate->sightings + 1 >= options_.sightings) sights_[s].claimed = true;
+  }
+  if (!options_.only) {
+    const auto taken = static_cast<double>(std::count(aside.begin(), aside.end(), true));
+    giveWay(first, options_.max_share * static_cast<double>(scan_->size()) - taken);
+  }
+  for (std::size_t s = first; s < sights_.size(); ++s) {
+    const Sight& sight = sights_[s];
+    if (!sight.claimed) continue;
+    for (int i = sight.first; i <= sight.last; i += sight.every) aside[static_cast<std::size_t>(i)] = true;
+  }
+}
+
+/// The match needs points, too: of the sights from `first` on the least certain leave theirs to it.
+void Landmarks::giveWay(std::size_t first, double left) {
+  std::vector<Sight*> claimed;
+  for (std::size_t s = first; s < sights_.size(); ++s) {
+    if (sights_[s].claimed) claimed.push_back(&sights_[s]);
+  }
+  std::sort(claimed.begin(), claimed.end(),
+            [](auto* a, auto* b) { return uncertainty(a->sighting) < uncertainty(b->sighting); });
   for (Sight* sight : claimed) {
-    const double wanted = sight->corner.last - sight->corner.first + 1;
-    sight->claimed = wanted <= left;
-    if (sight->claimed) left -= wanted;
+    sight->gives_way = sight->points() > left;
+    sight->claimed = !sight->gives_way;
+    if (sight->claimed) left -= sight->points();
   }
 }
 
 int Landmarks::update(MultiCloneFilter& filter, const ReferenceOptions& reference) {
-  int used = 0;
   // The most certain first: it makes the others more certain.
-  for (auto all = compatible(filter, reference, Stage::kUpdate); const Association* next = mostCertain(all);
+  for (auto all = compatible(filter, reference, Stage::kUpdate); const Association* next = mostCertain(all, filter);
        all = compatible(filter, reference, Stage::kUpdate)) {
-    Sight& sight = sights_[next->sight];
-    filter.update(next->landmark, sighting(sight.corner));
-    sight.used = true;
-    Known& known = known_[next->landmark];
-    known.farthest = std::max(known.farthest, sight.corner.base_from_corner.translation().norm());
-    known.misses = known.references = 0;
-    known.seen = scans_;
-    ++used;
+    use(*next, filter);
   }
-  giveUpMissed(filter);
+  const auto used = std::count_if(known_.begin(), known_.end(), [this](const Known& k) { return k.seen == scans_; });
+  giveUpMissed(filter, reference);
   beginNew(filter);
-  return used;
+  return static_cast<int>(used);
+}
+
+void Landmarks::use(const Association& association, MultiCloneFilter& filter) {
+  Sight& sight = sights_[association.sight];
+  Known& known = known_[association.landmark];
+  filter.update(association.landmark, sight.sighting);
+  if (sight.shape.is_line) {
+    Feature line = landmark(association.landmark, filter);
+    grow(line, moved(filter.pose(), sight.feature()));
+    known.shape = line.shape;
+  }
+  sight.used = true;
+  known.farthest = std::max(known.farthest, sight.farthest());
+  known.misses = known.references = 0;
+  known.seen = scans_;
 }
 
 void Landmarks::countReference() {
@@ -110,68 +140,69 @@ Eigen::Matrix3d Landmarks::slackOf(const Known& known, const ReferenceOptions& r
   return referenceSlack(static_cast<std::size_t>(known.references), reference);
 }
 
-/// Of corners and landmarks that are free yet, those that may belong together. What is claimed before the displacement,
-/// at a pose that only the wheels tell, is looked at again after it.
+bool Landmarks::isOf(Stage stage, const Sight& sight) {
+  if (stage == Stage::kExcuse) return sight.gives_way;
+  return !sight.used && (sight.claimed || stage == Stage::kClaim);
+}
+
+/// Of what is seen and of landmarks that are free yet, those that may belong together. What is claimed before the
+/// displacement, at a pose that only the wheels tell, is looked at again after it. Of a line a scan may see several
+/// pieces.
 std::vector<Landmarks::Association> Landmarks::compatible(const MultiCloneFilter& filter,
                                                           const ReferenceOptions& reference, Stage stage) const {
   const double farthest = 4.0 * options_.max_std;
-  const double bound = chiSquared(3, options_.probability);
-  const bool updates = stage == Stage::kUpdate;
   std::vector<Association> all;
   for (std::size_t l = 0; l < known_.size(); ++l) {
-    if (known_[l].seen == scans_) continue;
-    const SE2 expected = between(filter.pose(), filter.landmark(l));
-    const Eigen::Matrix3d slack = seenFrom(slackOf(known_[l], reference), expected);
+    if (known_[l].seen == scans_ && !known_[l].shape.is_line) continue;
+    const Feature expected = moved(inverse(filter.pose()), landmark(l, filter));
+    const Eigen::Matrix3d slack = slackOf(known_[l], reference);
     for (std::size_t s = 0; s < sights_.size(); ++s) {
-      const Corner& corner = sights_[s].corner;
-      if (sights_[s].used || (updates && !sights_[s].claimed)) continue;
-      if (std::abs(corner.angle - known_[l].angle) > kSameAngle) continue;
-      if (error(corner.base_from_corner, expected).head<2>().norm() > farthest) continue;
-      const Innovation r = filter.innovation(l, sighting(corner));
-      const double std = largestStd(r.covariance.topLeftCorner<2, 2>());
-      const bool is_certain = !updates || std <= options_.max_std;
-      if (is_certain && r.nis(slack) <= bound) all.push_back({s, l, std});
+      const Sight& sight = sights_[s];
+      if (!isOf(stage, sight) || !areOfAKind(expected, sight.feature())) continue;
+      if (distance(expected, sight.feature()) > farthest) continue;
+      const Innovation r = filter.innovation(l, sight.sighting);
+      const double std = stdOf(r);
+      const bool is_certain = stage != Stage::kUpdate || std <= options_.max_std;
+      const double bound = chiSquared(r.residual.size(), options_.probability);
+      if (is_certain && r.nis(seenFrom(slack, sight.sighting)) <= bound) all.push_back({s, l, std});
     }
   }
   return all;
 }
 
-/// Of those of which neither the corner may be another landmark's nor the landmark another corner's.
-const Landmarks::Association* Landmarks::mostCertain(const std::vector<Association>& all) {
+/// One thing seen is not two landmarks, nor the reverse. But what a line shows on either side of a gap is both it.
+bool Landmarks::excludeEachOther(const Association& a, const Association& b, const MultiCloneFilter& filter) const {
+  if ((a.sight == b.sight) == (a.landmark == b.landmark)) return false;
+  if (!sights_[a.sight].shape.is_line) return true;
+  if (a.sight == b.sight) return lieSideBySide(landmark(a.landmark, filter), landmark(b.landmark, filter));
+  return lieSideBySide(sights_[a.sight].feature(), sights_[b.sight].feature());
+}
+
+/// Of those that no other one excludes.
+const Landmarks::Association* Landmarks::mostCertain(const std::vector<Association>& all,
+                                                     const MultiCloneFilter& filter) const {
   const Association* best = nullptr;
   for (const Association& a : all) {
-    const auto rivals = std::count_if(all.begin(), all.end(), [&a](const Association& b) {
-      return (a.sight == b.sight) != (a.landmark == b.landmark);
-    });
-    if (rivals == 0 && (best == nullptr || a.std < best->std)) best = &a;
+    const bool has_rival =
+        std::any_of(all.begin(), all.end(), [&](const Association& b) { return excludeEachOther(a, b, filter); });
+    if (!has_rival && (best == nullptr || a.std < best->std)) best = &a;
   }
   return best;
 }
 
-const Landmarks::Candidate* Landmarks::candidateFor(const Corner& corner, const SE2& odom_from_base) const {
-  const SE2 odom_from_corner = compose(odom_from_base, corner.base_from_corner);
-  for (const Candidate& candidate : candidates_) {
-    const bool is_of_a_kind = std::abs(candidate.angle - corner.angle) < kSameAngle;
-    if (is_of_a_kind && areAlike(candidate.odom_from_corner, odom_from_corner)) return &candidate;
-  }
-  return nullptr;
+const Landmarks::Candidate* Landmarks::candidateFor(const Feature& in_odom) const {
+  const auto found = std::find_if(candidates_.begin(), candidates_.end(),
+                                  [&](const Candidate& candidate) { return areAlike(candidate.in_odom, in_odom); });
+  return found == candidates_.end() ? nullptr : &*found;
 }
 
-/// A landmark should be seen from where it has been seen before, unless something hides it.
-bool Landmarks::shouldSee(const SE2& base_from_landmark, double farthest) const {
-  constexpr double kBeamWidth = 0.035;  // [rad]
-  constexpr double kHidden = 0.3;       // [m]
-  const ScannedPoints& points = scan_->points;
-  if (points.size() == 0) return false;
-  const Eigen::Vector2d origin = points.point.front() - points.range.front() * points.ray.front();
-  const Eigen::Vector2d to_landmark = base_from_landmark.translation() - origin;
-  const double distance = to_landmark.norm();
-  if (distance > farthest) return false;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const bool is_on_beam = points.ray[i].dot(to_landmark) > std::cos(kBeamWidth) * distance;
-    if (is_on_beam && points.range[i] > distance - kHidden) return true;
-  }
-  return false;
+/// A landmark should be seen from where it has been seen before, unless something hides it; a line, if more than half
+/// of it is in view.
+bool Landmarks::shouldSee(const Feature& in_base, double farthest) const {
+  const FeatureShape& shape = in_base.shape;
+  if (!shape.is_line) return isCornerInView(in_base.frame, scan_->points, farthest);
+  const double enough = std::max(options_.line.min_length, 0.5 * (shape.to - shape.from));
+  return stretchInView(in_base, scan_->points, corners_have_, farthest) > enough;
 }
 
 void Landmarks::giveUp(std::size_t landmark, MultiCloneFilter& filter) {
@@ -179,28 +210,31 @@ void Landmarks::giveUp(std::size_t landmark, MultiCloneFilter& filter) {
   known_.erase(known_.begin() + static_cast<std::ptrdiff_t>(landmark));
 }
 
-void Landmarks::giveUpMissed(MultiCloneFilter& filter) {
+void Landmarks::giveUpMissed(MultiCloneFilter& filter, const ReferenceOptions& reference) {
+  std::vector<bool> excused(known_.size(), false);
+  for (const Association& a : compatible(filter, reference, Stage::kExcuse)) excused[a.landmark] = true;
   for (std::size_t l = known_.size(); l-- > 0;) {
     Known& known = known_[l];
-    if (known.seen == scans_ || !shouldSee(between(filter.pose(), filter.landmark(l)), known.farthest)) continue;
+    if (known.seen == scans_ || excused[l]) continue;
+    if (!shouldSee(moved(inverse(filter.pose()), landmark(l, filter)), known.farthest)) continue;
     if (++known.misses >= options_.misses) giveUp(l, filter);
   }
 }
 
-bool Landmarks::isNearLandmark(const Corner& corner, const MultiCloneFilter& filter) const {
-  const SE2 odom_from_corner = compose(filter.pose(), corner.base_from_corner);
+bool Landmarks::isNearLandmark(const Feature& in_odom, const MultiCloneFilter& filter) const {
   for (std::size_t l = 0; l < known_.size(); ++l) {
-    if (areAlike(filter.landmark(l), odom_from_corner)) return true;
+    if (areAlike(landmark(l, filter), in_odom)) return true;
   }
   return false;
 }
 
 void Landmarks::beginNew(MultiCloneFilter& filter) {
   for (const Sight& sight : sights_) {
-    if (sight.used || isNearLandmark(sight.corner, filter)) continue;
-    const Candidate* candidate = candidateFor(sight.corner, filter.pose());
+    const Feature in_odom = moved(filter.pose(), sight.feature());
+    if (sight.used || isNearLandmark(in_odom, filter)) continue;
+    const Candidate* candidate = candidateFor(in_odom);
     if (!sight.claimed || candidate == nullptr || candidate->sightings + 1 < options_.sightings) {
-      remember(sight.corner, filter.pose());
+      remember(in_odom);
       continue;
     }
     while (known_.size() >= static_cast<std::size_t>(options_.max)) {
@@ -209,29 +243,30 @@ void Landmarks::beginNew(MultiCloneFilter& filter) {
       giveUp(static_cast<std::size_t>(oldest - known_.begin()), filter);
     }
     candidates_.erase(candidates_.begin() + (candidate - candidates_.data()));
-    filter.addLandmark(sighting(sight.corner));
-    known_.push_back({sight.corner.angle, sight.corner.base_from_corner.translation().norm(), 0, 0, scans_});
+    filter.addLandmark(sight.sighting);
+    known_.push_back({sight.shape, sight.farthest(), 0, 0, scans_});
   }
   const auto is_forgotten = [this](const Candidate& candidate) { return candidate.seen + kForgotten < scans_; };
   candidates_.erase(std::remove_if(candidates_.begin(), candidates_.end(), is_forgotten), candidates_.end());
 }
 
-void Landmarks::remember(const Corner& corner, const SE2& odom_from_base) {
-  const Candidate* known = candidateFor(corner, odom_from_base);
-  const SE2 odom_from_corner = compose(odom_from_base, corner.base_from_corner);
+void Landmarks::remember(const Feature& in_odom) {
+  const Candidate* known = candidateFor(in_odom);
   if (known == nullptr) {
-    candidates_.push_back({odom_from_corner, corner.angle, 1, scans_});
+    candidates_.push_back({in_odom, 1, scans_});
     return;
   }
   Candidate& candidate = candidates_[static_cast<std::size_t>(known - candidates_.data())];
-  if (candidate.seen == scans_) return;  // by another corner of this scan
-  candidate = {odom_from_corner, corner.angle, candidate.sightings + 1, scans_};
+  if (candidate.seen == scans_) return;  // by another one of this scan
+  candidate = {in_odom, candidate.sightings + 1, scans_};
 }
 
 std::vector<LandmarkView> Landmarks::views(const MultiCloneFilter& filter) const {
   std::vector<LandmarkView> views;
   for (std::size_t l = 0; l < known_.size(); ++l) {
-    views.push_back({filter.landmark(l), filter.landmarkCovariance(l).topLeftCorner<2, 2>(), known_[l].seen == scans_});
+    const FeatureShape& shape = known_[l].shape;
+    views.push_back({filter.landmark(l), filter.landmarkCovariance(l), known_[l].seen == scans_, shape.is_line,
+                     shape.from, shape.to});
   }
   return views;
 }

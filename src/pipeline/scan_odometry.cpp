@@ -48,6 +48,9 @@ void checkLasers(const PipelineOptions& options) {
 }
 
 void checkLandmarks(const PipelineOptions& options) {
+  if (options.landmarks.only && !options.landmarks.on()) {
+    throw std::invalid_argument("landmarks_only is true: expected false with landmarks \"none\"");
+  }
   if (!options.landmarks.on() || !options.pose_updates.on) return;
   throw std::invalid_argument("landmarks is \"" + options.landmarks.use +
                               "\": expected \"none\" with use_pose_updates: the estimate in map has none");
@@ -172,7 +175,7 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
     report.outcome = ScanOutcome::kUnusable;
   } else if (const auto reference = references_.newestOf(waiting.laser); !reference) {
     report.new_reference = true;
-  } else if (options_.landmarks.withDisplacements()) {
+  } else if (!options_.landmarks.only) {
     compareWithReference(*reference, report);  // (16)-(23)
   }
   if (report.scan) useLandmarks(report);
@@ -278,7 +281,7 @@ void ScanOdometry::useLandmarks(ScanReport& report) {
   if (filter == nullptr) return;
   report.landmarks_used = landmarks_.update(*filter, options_.reference);
   report.landmarks = landmarks_.views(*filter);
-  if (options_.landmarks.withDisplacements() || report.new_reference) return;
+  if (!options_.landmarks.only || report.new_reference) return;
   report.outcome = report.landmarks_used > 0 ? ScanOutcome::kUpdated : ScanOutcome::kNoMatch;
   if (report.landmarks_used == 0) report.reason = "no landmark seen; displacements are not used";
 }

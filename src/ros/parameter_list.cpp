@@ -123,8 +123,10 @@ List otherSensors(PipelineOptions& pipeline) {
 /// Of a new estimate.
 List landmarkParameters(LandmarkOptions& landmarks) {
   CornerOptions& corner = landmarks.corner;
+  LineOptions& line = landmarks.line;
   return {
       text("landmarks", landmarks.use, landmarkUses()),
+      flag("landmarks_only", landmarks.only),
       number("landmarks_max", landmarks.max, within(1, 1000), "landmarks"),
       number("landmark_sightings", landmarks.sightings, within(2, 1000), "scans"),
       number("landmark_misses", landmarks.misses, within(1, 1000000), "scans"),
@@ -138,6 +140,12 @@ List landmarkParameters(LandmarkOptions& landmarks) {
       number("corner_min_angle", corner.min_angle, within(0.1, 1.5), "rad"),
       number("corner_std_position", corner.std_position, within(0.0, 10.0), "m"),
       number("corner_std_yaw", corner.std_yaw, within(0.0, 10.0), "rad"),
+      number("line_min_length", line.min_length, aboveUpTo(0.0, 100.0), "m"),
+      number("line_min_points", line.min_points, within(3, 1000), "points"),
+      number("line_points", line.points, within(3, 1000), "points"),
+      number("line_roughness", line.roughness, within(0.0, 10.0), "m"),
+      number("line_std_offset", line.std_offset, within(0.0, 10.0), "m"),
+      number("line_std_yaw", line.std_yaw, within(0.0, 10.0), "rad"),
   };
 }
 

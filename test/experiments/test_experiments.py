@@ -224,10 +224,12 @@ class AllExperiments(unittest.TestCase):
         for name in ("clones", "landmarks"):
             self.assertTrue(0.3 < n[f"slope_{name}"] < 2.6, n)
 
-    def test_landmarks_beside_displacements_do_no_harm(self) -> None:
+    def test_with_landmarks_beside_displacements_the_second_pass_falls_on_the_first(self) -> None:
         n = self.numbers("extensions")
-        self.assertLess(n["landmarks_corners_end"], n["landmarks_none_end"] + 0.3, n)
-        self.assertNotEqual(n["landmarks_corners_end"], n["landmarks_none_end"], "the corners had no part in it")
+        for landmarks in ("corners", "lines", "corners_and_lines"):
+            self.assertLess(n[f"landmarks_{landmarks}_end"], 0.06, n)
+        self.assertEqual(len({n[f"landmarks_{key}_end"] for key in ("none", "corners", "lines", "corners_and_lines")}), 4,
+                         "some had no part in it")
 
 
 class CommandLine(unittest.TestCase):

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Landmarks through the nodelet: they are the corners of the room, rviz is shown them, and the topic status counts
-them.
+"""Landmarks through the nodelet: they are the corners and the walls of the room, rviz is shown them, and the topic status
+counts them.
 """
 
 import unittest
@@ -44,6 +44,27 @@ class LandmarksOfARoom(unittest.TestCase):
         self.assertGreaterEqual(len(found), 5)
         self.assertLess(distances.max(), 0.15, found)
 
+    def walls(self):
+        """Both ends of the walls that are landmarks, in odom at the end, n x 2 x 2."""
+        markers = [m for m in self.arrays[max(self.scans)].markers if m.ns in ('lines', 'seen_lines')]
+        return np.array([(p.x, p.y) for marker in markers for p in marker.points]).reshape(-1, 2, 2)
+
+    def test_there_are_walls_of_the_room(self):
+        """Each lies on a wall, within its ends, and has its band."""
+        start = simulated_bag.truth(0.0)
+        walls = self.walls()
+        self.assertGreaterEqual(len(walls), 1)
+        for wall in walls:
+            ends = np.array([simulated_bag.compose(start, [x, y, 0.0])[:2] for x, y in wall])
+            off = []
+            for a, b in simulated_bag.walls():
+                along = (b - a) / np.linalg.norm(b - a)
+                beyond = np.maximum(-(ends - a) @ along, (ends - b) @ along).max()
+                off.append(max(beyond, np.abs((ends - a) @ np.array([-along[1], along[0]])).max()))
+            self.assertLess(min(off), 0.2, ends)
+        bands = next(m for m in self.arrays[max(self.scans)].markers if m.ns == 'covariance_of_lines')
+        self.assertEqual(len(bands.points), 64 * len(walls))
+
     def test_there_is_an_ellipse_about_each(self):
         array = self.arrays[max(self.scans)]
         ellipses = next(m for m in array.markers if m.ns == 'covariance')
@@ -57,7 +78,7 @@ class LandmarksOfARoom(unittest.TestCase):
 
     def test_the_status_counts_them(self):
         statuses = self.recorder.messages('status')
-        self.assertEqual(statuses[-1].landmarks, len(self.crosses()))
+        self.assertEqual(statuses[-1].landmarks, len(self.crosses()) + len(self.walls()))
         self.assertGreater(sum(status.landmarks_used for status in statuses), len(statuses))
         self.assertEqual(statuses[0].landmarks, 0)
 

@@ -11,10 +11,15 @@
 namespace sckf {
 
 /// A landmark as one scan sees it: the pose of a frame that is fixed to it, in base_link, with the covariance of its
-/// additive error, which is independent of everything else: of ranges that nothing else uses.
+/// additive error, which is independent of everything else: of ranges that nothing else uses. Of a line the frame may
+/// be anywhere along its x axis: its offset and its yaw are seen, and where along it the frame is has no error.
 struct Sighting {
   SE2 base_from_landmark;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  bool is_line = false;
+
+  /// The directions of x, y, yaw in base_link that are seen, d × 3: all three; of a line across it, and yaw.
+  Displacement::MatrixD3 seen() const;
 };
 
 /// An extended Kalman filter of the present pose, of every clone and, if asked for, of states that are not cloned:
@@ -61,7 +66,8 @@ class MultiCloneFilter : public FusionMethod {
   Eigen::Matrix3d landmarkCovariance(std::size_t number) const;                        ///< of its additive error
   void addLandmark(const Sighting& sighting);
   void forgetLandmark(std::size_t number);  ///< those after it move up
-  /// What is seen less what is expected, 3, with its covariance.
+  /// What is seen less what is expected in the directions that are seen, d, with its covariance. Of a line where it is
+  /// sighted: there and not at its frame's origin it is compared.
   Innovation innovation(std::size_t landmark, const Sighting& sighting) const;
   void update(std::size_t landmark, const Sighting& sighting);
 

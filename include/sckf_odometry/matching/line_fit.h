@@ -44,4 +44,8 @@ inline double shiftByRange(const Surface& line, const ScannedPoints& points, int
 /// (the adaptive breakpoint of Borges and Aldon).
 bool connected(const ScannedPoints& points, std::size_t i, double range_noise, double angle_increment);
 
+/// The points between begin and end at which a connected stretch bends, in order: those that lie farthest from the line
+/// through the ends, while that is more than `most` (iterative end point fit).
+std::vector<int> bends(const std::vector<Eigen::Vector2d>& points, int begin, int end, double most);
+
 }  // namespace sckf

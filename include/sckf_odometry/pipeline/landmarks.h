@@ -1,5 +1,5 @@
-// Which corners of the scans are landmarks: when one enters the state, which one a scan sees again, when it is given
-// up.
+// Which corners and lines of the scans are landmarks: when one enters the state, which one a scan sees again, when it
+// is given up.
 #pragma once
 
 #include <memory>
@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "sckf_odometry/core/multi_clone_filter.h"
-#include "sckf_odometry/matching/corners.h"
+#include "sckf_odometry/pipeline/feature.h"
 #include "sckf_odometry/pipeline/reference_policy.h"
 #include "sckf_odometry/pipeline/scan_report.h"
 
@@ -15,19 +15,22 @@ namespace sckf {
 
 struct LandmarkOptions {
   std::string use = "none";  ///< one of landmarkUses()
+  bool only = false;         ///< displacements are not used
   int max = 60;              ///< landmarks in the state; beyond, the one that has not been seen for longest is given up
-  int sightings = 3;         ///< scans that see a corner before it becomes a landmark …
+  int sightings = 3;         ///< scans that see a corner or a line before it becomes a landmark …
   int misses = 10;           ///< … and scans that should see it and do not until it is none any more
   double max_share = 0.5;    ///< of a scan's points that landmarks may take from its match
-  double max_std = 0.1;      ///< [m] a place that is known worse is not compared with a corner
-  double probability = 0.99;  ///< χ²: a corner that is less likely than 1 − this is another one
+  double max_std = 0.07;     ///< [m] a place that is known worse is not compared with what is seen
+  double probability = 0.99;  ///< χ²: what is less likely than 1 − this is something else
   CornerOptions corner;
+  LineOptions line;
 
   bool on() const { return use != "none"; }
-  bool withDisplacements() const { return use != "corners_only"; }
+  bool corners() const { return use == "corners" || use == "corners_and_lines"; }
+  bool lines() const { return use == "lines" || use == "corners_and_lines"; }
 };
 
-/// none; corners: beside the displacements, which get all other points; corners_only: displacements are not used.
+/// none; corners; lines; corners_and_lines: of a line only what no corner takes.
 const std::vector<std::string>& landmarkUses();
 
 /// For each scan, in this order: claim(), the displacements if any, update(). A range has a part in a landmark or in a
@@ -40,8 +43,8 @@ class Landmarks {
   /// From the next scan on.
   void setOptions(const LandmarkOptions& options) { options_ = options; }
 
-  /// Finds the corners of a scan at the filter's pose and sets those aside that are, or may become, landmarks.
-  /// reference, here as below: what the estimate may be off beyond its covariance.
+  /// Finds the corners and lines of a scan at the filter's pose and sets those aside that are, or may become,
+  /// landmarks. reference, here as below: what the estimate may be off beyond its covariance.
   std::shared_ptr<const PreparedScan> claim(std::shared_ptr<const PreparedScan> scan, const MultiCloneFilter& filter,
                                             const ReferenceOptions& reference, const SurfaceOptions& surface);
 
@@ -57,22 +60,22 @@ class Landmarks {
  private:
   /// What is known of a landmark beside its state; in the order of the filter's.
   struct Known {
-    double angle = 0.0;     // between the walls [rad]
+    FeatureShape shape;
     double farthest = 0.0;  // [m] from which it has been seen
     int misses = 0;         // since it was last seen
     int references = 0;     // since it was last seen
     std::size_t seen = 0;   // number of the last scan that saw it
   };
-  /// A corner that is not, or not yet, a landmark.
+  /// What is not, or not yet, a landmark.
   struct Candidate {
-    SE2 odom_from_corner;
-    double angle = 0.0;
+    Feature in_odom;
     int sightings = 1;
     std::size_t seen = 0;
   };
-  struct Sight {
-    Corner corner;
-    bool claimed = false;
+  struct Sight : FeatureSight {
+    using FeatureSight::FeatureSight;
+    bool claimed = false;    // its points are in no match
+    bool gives_way = false;  // they would be, had the match no need of them
     bool used = false;
   };
   struct Association {
@@ -80,20 +83,28 @@ class Landmarks {
     std::size_t landmark = 0;
     double std = 0.0;  // [m] of where the landmark was expected
   };
-  enum class Stage { kClaim, kUpdate };
+  enum class Stage { kClaim, kUpdate, kExcuse };
 
+  Feature landmark(std::size_t number, const MultiCloneFilter& filter) const {
+    return {filter.landmark(number), known_[number].shape};
+  }
+  void claim(std::size_t first, const MultiCloneFilter& filter, const ReferenceOptions& reference,
+             std::vector<bool>& aside);
+  void giveWay(std::size_t first, double left);
   static Eigen::Matrix3d slackOf(const Known& known, const ReferenceOptions& reference);
+  static bool isOf(Stage stage, const Sight& sight);
   std::vector<Association> compatible(const MultiCloneFilter& filter, const ReferenceOptions& reference,
                                       Stage stage) const;
-  static const Association* mostCertain(const std::vector<Association>& all);
-  const Candidate* candidateFor(const Corner& corner, const SE2& odom_from_base) const;
-  void giveWay(std::size_t points);
-  bool shouldSee(const SE2& base_from_landmark, double farthest) const;
+  bool excludeEachOther(const Association& a, const Association& b, const MultiCloneFilter& filter) const;
+  const Association* mostCertain(const std::vector<Association>& all, const MultiCloneFilter& filter) const;
+  void use(const Association& association, MultiCloneFilter& filter);
+  const Candidate* candidateFor(const Feature& in_odom) const;
+  bool shouldSee(const Feature& in_base, double farthest) const;
   void giveUp(std::size_t landmark, MultiCloneFilter& filter);
-  void giveUpMissed(MultiCloneFilter& filter);
-  bool isNearLandmark(const Corner& corner, const MultiCloneFilter& filter) const;
+  void giveUpMissed(MultiCloneFilter& filter, const ReferenceOptions& reference);
+  bool isNearLandmark(const Feature& in_odom, const MultiCloneFilter& filter) const;
   void beginNew(MultiCloneFilter& filter);
-  void remember(const Corner& corner, const SE2& odom_from_base);
+  void remember(const Feature& in_odom);
 
   LandmarkOptions options_;
   std::vector<Known> known_;
@@ -101,7 +112,8 @@ class Landmarks {
   std::size_t scans_ = 0;
 
   std::shared_ptr<const PreparedScan> scan_;  // the present one, whole
-  std::vector<Sight> sights_;                 // its corners
+  std::vector<Sight> sights_;                 // its corners and lines
+  std::vector<bool> corners_have_;            // of its points, those of claimed corners
 };
 
 }  // namespace sckf

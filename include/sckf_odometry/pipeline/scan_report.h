@@ -48,8 +48,11 @@ std::string toString(HeadingUse use);
 /// A landmark of the state.
 struct LandmarkView {
   SE2 odom_from_landmark;
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< of its position
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of the error of x, y, yaw
   bool used = false;                                     ///< the scan has seen it
+  bool is_line = false;                                  ///< or a corner
+  double from = 0.0;                                     ///< of a line: along its x axis it is known from here [m] …
+  double to = 0.0;                                       ///< … to here
 };
 
 struct ScanReport {

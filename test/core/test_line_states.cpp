@@ -1,0 +1,285 @@
+// Straight walls in the state, of which no sighting tells where along them it is: hand values, numerical derivatives,
+// what they must never learn, and whether the covariance can be believed.
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <string>
+#include <vector>
+
+#include "chi_squared_band.h"
+#include "matrix_matchers.h"
+#include "random_inputs.h"
+#include "sckf_odometry/core/multi_clone_filter.h"
+#include "sckf_odometry/core/odometry_model.h"
+#include "sckf_odometry/experiments/room_simulation.h"
+
+namespace sckf {
+namespace {
+
+using Eigen::Matrix2d;
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+/// A line that is seen so certainly in offset and yaw.
+Sighting sighting(const SE2& base_from_line, const Matrix2d& across_and_yaw) {
+  Sighting line{base_from_line, Matrix3d::Zero(), true};
+  line.covariance = line.seen().transpose() * across_and_yaw * line.seen();
+  return line;
+}
+
+Matrix2d diagonal(double across, double yaw) { return Vector2d(across, yaw).cwiseAbs2().asDiagonal(); }
+
+// The robot looks along x, and sees a wall 2 m to its left, which runs along x too.
+//
+//      ————————→ L
+//      robot →           y
+//                        +-- x
+//
+TEST(LineStates, WhereAlongItTheFrameIsIsNothingThatIsMeasured) {
+  MultiCloneFilter filter(SE2(), Matrix3d::Zero());
+  filter.addLandmark(sighting(SE2(1.0, 2.0, 0.0), diagonal(0.1, 0.05)));
+  EXPECT_TRUE(matricesNear(filter.landmarkCovariance(0), Matrix3d(Vector3d(0.0, 0.01, 0.0025).asDiagonal()), 1e-12));
+  const Innovation r = filter.innovation(0, sighting(SE2(7.0, 2.1, 0.0), diagonal(0.0, 0.0)));
+  EXPECT_TRUE(matricesNear(r.residual, Vector2d(0.1, 0.0), 1e-12));
+  // Six metres further on its yaw is a lever.
+  Matrix2d expected;
+  expected << 0.01 + 36.0 * 0.0025, 6.0 * 0.0025, 6.0 * 0.0025, 0.0025;
+  EXPECT_TRUE(matricesNear(r.covariance, expected, 1e-12));
+}
+
+TEST(LineStates, TheInnovationIsOfBothSightings) {
+  MultiCloneFilter filter(SE2(3.0, 1.0, 0.4), Vector3d(1.0, 1.0, 0.5).asDiagonal());
+  const Sighting seen = sighting(SE2(2.0, 1.0, 0.3), diagonal(0.2, 0.05));
+  filter.addLandmark(seen);
+  const Vector2d normal(-std::sin(0.3), std::cos(0.3));
+  const SE2 off(2.0 + 0.1 * normal.x(), 1.0 + 0.1 * normal.y(), 0.3);
+  const Sighting again = sighting(off, diagonal(0.2, 0.05));
+  const Innovation r = filter.innovation(0, again);
+  EXPECT_TRUE(matricesNear(r.residual, Vector2d(0.1, 0.0), 1e-12));
+  EXPECT_TRUE(matricesNear(r.covariance, 2.0 * diagonal(0.2, 0.05), 1e-12));
+  EXPECT_NEAR(r.nis(), 0.125, 1e-9);
+  filter.update(0, again);
+  const SE2 expected = between(filter.pose(), filter.landmark(0));
+  EXPECT_NEAR(normal.dot(expected.translation() - Vector2d(2.0, 1.0)), 0.05, 1e-3) << "halfway";
+  EXPECT_TRUE(matricesNear(filter.innovation(0, again).covariance, 1.5 * diagonal(0.2, 0.05), 1e-3));
+}
+
+/// Offset and yaw by which a line is sighted beside another, both as a robot sees them, in plain geometry.
+Vector2d offBy(const SE2& sighted, const SE2& expected) {
+  const Vector2d along(std::cos(expected.yaw), std::sin(expected.yaw));
+  const Vector2d d = sighted.translation() - expected.translation();
+  return {along.x() * d.y() - along.y() * d.x(), wrapAngle(sighted.yaw - expected.yaw)};
+}
+
+TEST(LineStates, TheInnovationsCovarianceByNumericalDerivatives) {
+  RandomInputs random(41);
+  for (int i = 0; i < 30; ++i) {
+    const SE2 start = random.pose(5.0);
+    const SE2 motion = random.pose(2.0);
+    const SE2 first = random.pose(4.0);
+    const SE2 world_from_line = compose(start, first);
+    const SE2 again = compose(between(compose(start, motion), world_from_line), SE2(random.uniform(-3.0, 3.0), 0, 0));
+    const Matrix3d Q = random.covariance(3, 0.1);
+    const Matrix2d R = random.covariance(2, 0.1);
+
+    MultiCloneFilter filter(start, random.covariance(3, 0.3));
+    const Sighting sighted = sighting(first, R);
+    filter.addLandmark(sighted);
+    filter.propagate({motion, Q});
+    const Innovation r = filter.innovation(0, sighting(again, Matrix2d::Zero()));
+    EXPECT_LT(r.residual.norm(), 1e-9);
+
+    // By the error of the motion, and by that of the first sighting.
+    constexpr double kStep = 1e-6;
+    const auto expected = [&](const Vector3d& of_motion, const Vector3d& of_sighting) {
+      const SE2 line = compose(start, corrected(first, of_sighting));
+      return between(compose(start, corrected(motion, of_motion)), line);
+    };
+    Eigen::Matrix<double, 2, 3> by_motion;
+    Eigen::Matrix<double, 2, 3> by_sighting;
+    for (int j = 0; j < 3; ++j) {
+      const Vector3d e = kStep * Vector3d::Unit(j);
+      const Vector3d none = Vector3d::Zero();
+      by_motion.col(j) = (offBy(again, expected(e, none)) - offBy(again, expected(-e, none))) / (2.0 * kStep);
+      by_sighting.col(j) = (offBy(again, expected(none, e)) - offBy(again, expected(none, -e))) / (2.0 * kStep);
+    }
+    const Matrix2d numerical =
+        by_motion * Q * by_motion.transpose() + by_sighting * sighted.covariance * by_sighting.transpose();
+    EXPECT_TRUE(matricesNear(r.covariance, numerical, 1e-6));
+  }
+}
+
+TEST(LineStates, AlongACorridorNobodyLearnsWhereTheRobotIs) {
+  // Noise moves the walls' estimates about, and with each the direction that they leave open: it must not close.
+  RandomInputs random(7);
+  const Matrix3d Q = Vector3d(0.02, 0.02, 0.02).cwiseAbs2().asDiagonal();
+  MultiCloneFilter filter(SE2(), Matrix3d::Zero());
+  SE2 truth;
+  double by_wheels = 0.0;  // [m²]
+  for (int scan = 0; scan < 400; ++scan) {
+    const SE2 motion(0.1, 0.0, -0.2 * truth.yaw - 0.02 * truth.y);
+    filter.propagate({motion, Q});
+    truth = compose(truth, corrected(motion, random.drawnFrom(Q)));
+    by_wheels += Q(0, 0);
+    for (const double side : {1.5, -1.5}) {
+      const SE2 wall(truth.x + random.uniform(-2.0, 2.0), side, 0.0);
+      const Matrix2d R = diagonal(0.01, 0.01);
+      const SE2 seen =
+          between(truth, compose(wall, SE2(0.0, 0.01 * random.gaussian(1)(0), 0.01 * random.gaussian(1)(0))));
+      const std::size_t number = side > 0.0 ? 0 : 1;
+      if (filter.landmarks() <= number) {
+        filter.addLandmark(sighting(seen, R));
+      } else {
+        filter.update(number, sighting(seen, R));
+      }
+    }
+    ASSERT_GT(filter.covariance()(0, 0), 0.999 * by_wheels) << "at scan " << scan;
+  }
+  const SE2 beside(0.0, between(filter.pose(), filter.landmark(0)).y, 0.0);
+  EXPECT_LT(std::sqrt(filter.innovation(0, sighting(beside, diagonal(0.0, 0.0))).covariance(0, 0)), 0.01);
+}
+
+TEST(LineStates, NobodyLearnsWhereTheWholeIs) {
+  RandomInputs random(184);
+  MultiCloneFilter filter(SE2(), Vector3d(1.0, 1.0, 0.09).asDiagonal());
+  for (int scan = 0; scan < 500; ++scan) {
+    filter.propagate({SE2(0.3, 0.02, 0.05), random.covariance(3, 0.1)});
+    for (std::size_t i = 0; i < filter.landmarks(); ++i) {
+      const SE2 expected = between(filter.pose(), filter.landmark(i));
+      const SE2 off(0.5 * random.gaussian(1)(0), 0.05 * random.gaussian(1)(0), 0.05 * random.gaussian(1)(0));
+      filter.update(i, sighting(compose(expected, off), random.covariance(2, 0.05)));
+    }
+    if (scan % 10 == 0) filter.addLandmark(sighting(random.pose(5.0), random.covariance(2, 0.05)));
+    if (filter.landmarks() > 5) filter.forgetLandmark(0);
+    ASSERT_GE(filter.covariance()(2, 2), 0.09 * (1.0 - 1e-6)) << "yaw variance at scan " << scan;
+  }
+}
+
+// ---- consistency
+
+constexpr int kRuns = 200;
+constexpr int kScans = 40;
+
+struct Statistics {
+  std::vector<double> pose = std::vector<double>(kScans + 1, 0.0);
+  std::vector<double> line = pose;           // offset and yaw of one in base_link
+  std::vector<double> squared_error = pose;  // [m²]
+};
+
+/// A robot in a room without features along x, but for pieces of wall here and there, turned anyhow, that it sees from
+/// up to 4 m, each time another stretch of them.
+class Robot {
+ public:
+  Robot(bool displacements, bool lines, std::uint64_t seed)
+      : displacements_(displacements),
+        lines_(lines),
+        random_(seed),
+        room_({{{0, 1}, 3.0}, {{0, -1}, 3.0}, {{1, 0}, 9.0}, {{-1, 0}, 9.0}}, 0.06),
+        filter_(corrected(truth_, random_.drawnFrom(kStart)), kStart) {
+    for (double x = -8.0; x < 9.0; x += 1.0) walls_.push_back({x, 2.5, random_.uniform(-M_PI, M_PI)});
+    reference_ = room_.scan(truth_, random_);
+    filter_.clone(reference_.variance);
+  }
+
+  void run(Statistics& sums) {
+    for (int scan = 1; scan <= kScans; ++scan) {
+      for (int i = 0; i < 3; ++i) drive(SE2(0.08, 0.0, 0.05 * std::cos(0.1 * (3 * scan + i))));
+      const SimulatedScan current = room_.scan(truth_, random_);
+      if (displacements_) {
+        const Displacement z = room_.match(reference_, current, random_);
+        filter_.update(z, filter_.innovation(z));
+      }
+      if (lines_) see();
+      if (displacements_ && scan % 2 == 0) {
+        filter_.clone(current.variance);
+        reference_ = current;
+        if (filter_.clones() > 2) filter_.forget(2);
+      }
+      note(static_cast<std::size_t>(scan), sums);
+    }
+  }
+
+ private:
+  void drive(const SE2& by_wheels) {
+    OdometryNoise noise;
+    noise.translation_per_meter = noise.translation_per_radian = 0.05;
+    noise.yaw_per_meter = noise.yaw_per_radian = 0.08;
+    const OdometryIncrement increment = modelledIncrement(by_wheels, noise);
+    filter_.propagate(increment);
+    truth_ = compose(truth_, corrected(by_wheels, random_.drawnFrom(increment.covariance)));
+  }
+
+  Sighting sighted(const SE2& wall) {
+    const SE2 truth = between(truth_, compose(wall, SE2(random_.uniform(-0.8, 0.8), 0.0, 0.0)));
+    const Matrix2d R = random_.covariance(2, 0.02);
+    const Vector2d off = random_.drawnFrom(R);
+    return sighting(compose(truth, SE2(0.0, off(0), off(1))), R);
+  }
+
+  void see() {
+    for (std::size_t i = 0; i < walls_.size(); ++i) {
+      if (between(truth_, walls_[i]).translation().norm() > 4.0) continue;
+      const Sighting z = sighted(walls_[i]);
+      const auto known = std::find(known_.begin(), known_.end(), i);
+      if (known != known_.end()) {
+        filter_.update(static_cast<std::size_t>(known - known_.begin()), z);
+        continue;
+      }
+      filter_.addLandmark(z);
+      known_.push_back(i);
+      if (known_.size() <= 8) continue;  // the oldest is given up
+      filter_.forgetLandmark(0);
+      known_.pop_front();
+    }
+  }
+
+  void note(std::size_t scan, Statistics& sums) const {
+    const Vector3d e = error(truth_, filter_.pose());
+    sums.pose[scan] += e.dot(filter_.covariance().llt().solve(e)) / kRuns;
+    sums.squared_error[scan] += e.head<2>().squaredNorm() / kRuns;
+    if (known_.empty()) return;
+    const Sighting truth = sighting(between(truth_, walls_[known_.back()]), Matrix2d::Zero());
+    sums.line[scan] += filter_.innovation(known_.size() - 1, truth).nis() / kRuns;
+  }
+
+  static inline const Matrix3d kStart = 1e-6 * Matrix3d::Identity();
+
+  bool displacements_;
+  bool lines_;
+  RandomInputs random_;
+  RoomSimulation room_;
+  SE2 truth_{-6.0, 0.0, 0.0};
+  MultiCloneFilter filter_;
+  SimulatedScan reference_;
+  std::vector<SE2> walls_;
+  std::deque<std::size_t> known_;  // which wall each landmark is
+};
+
+Statistics simulate(bool displacements, bool lines) {
+  Statistics sums;
+  for (int i = 0; i < kRuns; ++i) {
+    Robot(displacements, lines, 5000U + static_cast<std::uint64_t>(i)).run(sums);
+  }
+  return sums;
+}
+
+TEST(LineStates, ConsistentAloneAndBesideDisplacementsWhichTogetherAreTheBest) {
+  const ChiSquaredBand of_pose(3, kRuns);
+  const ChiSquaredBand of_line(2, kRuns);
+  const Statistics alone = simulate(false, true);
+  expectInBand(alone.pose, of_pose, "pose, lines alone");
+  expectInBand(alone.line, of_line, "line, lines alone");
+  const Statistics displacements = simulate(true, false);
+  const Statistics both = simulate(true, true);
+  expectInBand(both.pose, of_pose, "pose, both");
+  expectInBand(both.line, of_line, "line, both");
+  EXPECT_LT(both.squared_error[kScans], 0.9 * alone.squared_error[kScans]);
+  EXPECT_LT(both.squared_error[kScans], 0.9 * displacements.squared_error[kScans]);
+}
+
+}  // namespace
+}  // namespace sckf
