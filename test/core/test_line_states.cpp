@@ -2,19 +2,13 @@
 // what they must never learn, and whether the covariance can be believed.
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
-#include <algorithm>
 #include <cmath>
-#include <deque>
-#include <string>
 #include <vector>
 
-#include "chi_squared_band.h"
+#include "landmark_robot.h"
 #include "matrix_matchers.h"
 #include "random_inputs.h"
 #include "sckf_odometry/core/multi_clone_filter.h"
-#include "sckf_odometry/core/odometry_model.h"
-#include "sckf_odometry/experiments/room_simulation.h"
 
 namespace sckf {
 namespace {
@@ -161,124 +155,25 @@ TEST(LineStates, NobodyLearnsWhereTheWholeIs) {
 
 // ---- consistency
 
-constexpr int kRuns = 200;
-constexpr int kScans = 40;
-
-struct Statistics {
-  std::vector<double> pose = std::vector<double>(kScans + 1, 0.0);
-  std::vector<double> line = pose;           // offset and yaw of one in base_link
-  std::vector<double> squared_error = pose;  // [m²]
-};
-
-/// A robot in a room without features along x, but for pieces of wall here and there, turned anyhow, that it sees from
-/// up to 4 m, each time another stretch of them.
-class Robot {
- public:
-  Robot(bool displacements, bool lines, std::uint64_t seed)
-      : displacements_(displacements),
-        lines_(lines),
-        random_(seed),
-        room_({{{0, 1}, 3.0}, {{0, -1}, 3.0}, {{1, 0}, 9.0}, {{-1, 0}, 9.0}}, 0.06),
-        filter_(corrected(truth_, random_.drawnFrom(kStart)), kStart) {
-    for (double x = -8.0; x < 9.0; x += 1.0) walls_.push_back({x, 2.5, random_.uniform(-M_PI, M_PI)});
-    reference_ = room_.scan(truth_, random_);
-    filter_.clone(reference_.variance);
-  }
-
-  void run(Statistics& sums) {
-    for (int scan = 1; scan <= kScans; ++scan) {
-      for (int i = 0; i < 3; ++i) drive(SE2(0.08, 0.0, 0.05 * std::cos(0.1 * (3 * scan + i))));
-      const SimulatedScan current = room_.scan(truth_, random_);
-      if (displacements_) {
-        const Displacement z = room_.match(reference_, current, random_);
-        filter_.update(z, filter_.innovation(z));
-      }
-      if (lines_) see();
-      if (displacements_ && scan % 2 == 0) {
-        filter_.clone(current.variance);
-        reference_ = current;
-        if (filter_.clones() > 2) filter_.forget(2);
-      }
-      note(static_cast<std::size_t>(scan), sums);
-    }
-  }
-
- private:
-  void drive(const SE2& by_wheels) {
-    OdometryNoise noise;
-    noise.translation_per_meter = noise.translation_per_radian = 0.05;
-    noise.yaw_per_meter = noise.yaw_per_radian = 0.08;
-    const OdometryIncrement increment = modelledIncrement(by_wheels, noise);
-    filter_.propagate(increment);
-    truth_ = compose(truth_, corrected(by_wheels, random_.drawnFrom(increment.covariance)));
-  }
-
-  Sighting sighted(const SE2& wall) {
-    const SE2 truth = between(truth_, compose(wall, SE2(random_.uniform(-0.8, 0.8), 0.0, 0.0)));
-    const Matrix2d R = random_.covariance(2, 0.02);
-    const Vector2d off = random_.drawnFrom(R);
-    return sighting(compose(truth, SE2(0.0, off(0), off(1))), R);
-  }
-
-  void see() {
-    for (std::size_t i = 0; i < walls_.size(); ++i) {
-      if (between(truth_, walls_[i]).translation().norm() > 4.0) continue;
-      const Sighting z = sighted(walls_[i]);
-      const auto known = std::find(known_.begin(), known_.end(), i);
-      if (known != known_.end()) {
-        filter_.update(static_cast<std::size_t>(known - known_.begin()), z);
-        continue;
-      }
-      filter_.addLandmark(z);
-      known_.push_back(i);
-      if (known_.size() <= 8) continue;  // the oldest is given up
-      filter_.forgetLandmark(0);
-      known_.pop_front();
-    }
-  }
-
-  void note(std::size_t scan, Statistics& sums) const {
-    const Vector3d e = error(truth_, filter_.pose());
-    sums.pose[scan] += e.dot(filter_.covariance().llt().solve(e)) / kRuns;
-    sums.squared_error[scan] += e.head<2>().squaredNorm() / kRuns;
-    if (known_.empty()) return;
-    const Sighting truth = sighting(between(truth_, walls_[known_.back()]), Matrix2d::Zero());
-    sums.line[scan] += filter_.innovation(known_.size() - 1, truth).nis() / kRuns;
-  }
-
-  static inline const Matrix3d kStart = 1e-6 * Matrix3d::Identity();
-
-  bool displacements_;
-  bool lines_;
-  RandomInputs random_;
-  RoomSimulation room_;
-  SE2 truth_{-6.0, 0.0, 0.0};
-  MultiCloneFilter filter_;
-  SimulatedScan reference_;
-  std::vector<SE2> walls_;
-  std::deque<std::size_t> known_;  // which wall each landmark is
-};
-
-Statistics simulate(bool displacements, bool lines) {
-  Statistics sums;
-  for (int i = 0; i < kRuns; ++i) {
-    Robot(displacements, lines, 5000U + static_cast<std::uint64_t>(i)).run(sums);
-  }
-  return sums;
-}
-
+/// Pieces of wall, turned anyhow, of which each time another stretch is seen.
 TEST(LineStates, ConsistentAloneAndBesideDisplacementsWhichTogetherAreTheBest) {
-  const ChiSquaredBand of_pose(3, kRuns);
-  const ChiSquaredBand of_line(2, kRuns);
-  const Statistics alone = simulate(false, true);
-  expectInBand(alone.pose, of_pose, "pose, lines alone");
-  expectInBand(alone.line, of_line, "line, lines alone");
-  const Statistics displacements = simulate(true, false);
-  const Statistics both = simulate(true, true);
-  expectInBand(both.pose, of_pose, "pose, both");
-  expectInBand(both.line, of_line, "line, both");
-  EXPECT_LT(both.squared_error[kScans], 0.9 * alone.squared_error[kScans]);
-  EXPECT_LT(both.squared_error[kScans], 0.9 * displacements.squared_error[kScans]);
+  LandmarkWorld world{};
+  world.places = [](RandomInputs& random) {
+    std::vector<SE2> places;
+    for (double x = -8.0; x < 9.0; x += 1.0) places.push_back({x, 2.5, random.uniform(-M_PI, M_PI)});
+    return places;
+  };
+  world.exact = [](const SE2& base_from_line) { return sighting(base_from_line, Matrix2d::Zero()); };
+  world.seen = [](const SE2& robot, const SE2& wall, RandomInputs& random) {
+    const SE2 truth = between(robot, compose(wall, SE2(random.uniform(-0.8, 0.8), 0.0, 0.0)));
+    const Matrix2d R = random.covariance(2, 0.02);
+    const Vector2d off = random.drawnFrom(R);
+    return sighting(compose(truth, SE2(0.0, off(0), off(1))), R);
+  };
+  world.degrees_of_freedom = 2;
+  world.most = 8;
+  world.seed = 5000;
+  expectConsistentAndBestTogether(world);
 }
 
 }  // namespace

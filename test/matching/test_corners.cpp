@@ -6,7 +6,7 @@
 #include <random>
 
 #include "core/matrix_matchers.h"
-#include "matching/simulated_world.h"
+#include "matching/feature_scans.h"
 #include "sckf_odometry/matching/corners.h"
 
 namespace sckf::test {
@@ -21,14 +21,6 @@ CornerOptions exact() {
   return options;
 }
 
-std::shared_ptr<const PreparedScan> prepare(const LaserScan& scan) {
-  ScanOptions options;
-  options.min_points = 3;
-  auto prepared = prepareScan(scan, Eigen::Isometry3d::Identity(), options);
-  EXPECT_NE(prepared, nullptr);
-  return prepared;
-}
-
 /// Two walls that end at `corner` (in base_link), along two directions.
 World twoWalls(const Eigen::Vector2d& corner, double one, double other, double length = 2.0) {
   const auto end = [&](double yaw) -> Eigen::Vector2d {
@@ -37,22 +29,12 @@ World twoWalls(const Eigen::Vector2d& corner, double one, double other, double l
   return {{corner, end(one)}, {corner, end(other)}};
 }
 
-SimulatedLaser laser(double noise = 0.0) {
-  SimulatedLaser laser;
-  laser.beams = 721;
-  laser.angle_increment = 2.0 * M_PI / 721.0;
-  laser.noise = noise;
-  return laser;
-}
-
-LaserScan scanOf(const World& world) { return simulateScan(world, SE2(), laser()); }
-
 //        ----------+        y
 //                  |        |
 //        robot     |        +-- x
 //                  |
 TEST(Corners, AnInnerCornerLooksAtTheRobot) {
-  const auto corners = findCorners(*prepare(scanOf(twoWalls({3.0, 2.0}, M_PI, -M_PI_2))), CornerOptions());
+  const auto corners = findCorners(scanOf(twoWalls({3.0, 2.0}, M_PI, -M_PI_2)), CornerOptions());
   ASSERT_EQ(corners.size(), 1U);
   EXPECT_TRUE(matricesNear(corners[0].base_from_corner.vector(), Vector3d(3.0, 2.0, -0.75 * M_PI), 1e-4));
   EXPECT_NEAR(corners[0].angle, M_PI_2, 1e-4);
@@ -63,19 +45,19 @@ TEST(Corners, AnInnerCornerLooksAtTheRobot) {
 //                  |
 TEST(Corners, AnOuterCornerLooksAway) {
   // Seen from where both walls are in view: the robot is above the one and left of the other.
-  const auto corners = findCorners(*prepare(scanOf(twoWalls({2.0, -2.0}, 0.0, -M_PI_2))), CornerOptions());
+  const auto corners = findCorners(scanOf(twoWalls({2.0, -2.0}, 0.0, -M_PI_2)), CornerOptions());
   ASSERT_EQ(corners.size(), 1U);
   EXPECT_TRUE(matricesNear(corners[0].base_from_corner.vector(), Vector3d(2.0, -2.0, -M_PI_4), 1e-4));
 }
 
 TEST(Corners, ItsPointsAreThoseOfBothWallsUpToTheirLength) {
-  const auto scan = prepare(scanOf(twoWalls({3.0, 2.0}, M_PI, -M_PI_2)));
+  const PreparedScan scan = scanOf(twoWalls({3.0, 2.0}, M_PI, -M_PI_2));
   CornerOptions options;
   options.max_length = 1.0;
-  const auto corners = findCorners(*scan, options);
+  const auto corners = findCorners(scan, options);
   ASSERT_EQ(corners.size(), 1U);
-  for (std::size_t i = 0; i < scan->size(); ++i) {
-    const double distance = (scan->points.point[i] - Eigen::Vector2d(3.0, 2.0)).norm();
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const double distance = (scan.points.point[i] - Eigen::Vector2d(3.0, 2.0)).norm();
     const int k = static_cast<int>(i);
     const bool is_its_own = corners[0].first <= k && k <= corners[0].last;
     if (distance < 0.95) {
@@ -89,7 +71,7 @@ TEST(Corners, ItsPointsAreThoseOfBothWallsUpToTheirLength) {
 TEST(Corners, OfARoomAllAreFoundAndNoneSharesAPoint) {
   const World world = closedPolygon({{-3, -2}, {4, -2}, {4, 3}, {-3, 3}});
   std::mt19937_64 random(7);
-  const auto corners = findCorners(*prepare(simulateScan(world, SE2(), laser(0.01), &random)), CornerOptions());
+  const auto corners = findCorners(prepare(simulateScan(world, SE2(), fineLaser(0.01), &random)), CornerOptions());
   ASSERT_EQ(corners.size(), 4U);
   const double expected[4][3] = {{-3, -2, M_PI_4}, {4, -2, 0.75 * M_PI}, {4, 3, -0.75 * M_PI}, {-3, 3, -M_PI_4}};
   for (std::size_t i = 0; i < 4; ++i) {
@@ -103,7 +85,7 @@ TEST(Corners, OfARoomAllAreFoundAndNoneSharesAPoint) {
 
 TEST(Corners, WhatIsNone) {
   const auto count = [](const World& world, const CornerOptions& options = {}) {
-    return findCorners(*prepare(scanOf(world)), options).size();
+    return findCorners(scanOf(world), options).size();
   };
   EXPECT_EQ(count({{{3.0, -3.0}, {3.0, 3.0}}}), 0U) << "a wall";
   EXPECT_EQ(count(twoWalls({3.0, 0.0}, M_PI_2 + 0.2, -M_PI_2 - 0.2)), 0U) << "hardly a bend";
@@ -115,30 +97,24 @@ TEST(Corners, WhatIsNone) {
   EXPECT_EQ(count({{{2.0, -2.0}, {2.0, 0.0}}, {{4.0, -2.0}, {4.0, 2.0}}}), 0U) << "an occlusion";
   // Both depths near each other, as far as the beams tell connected, but the lines meet elsewhere.
   EXPECT_EQ(count({{{2.0, -2.0}, {2.0, 0.0}}, {{2.6, 0.0}, {4.0, 1.4}}}), 0U) << "walls that do not meet";
-  World circle;
-  for (int i = 0; i < 90; ++i) {
-    const double a = 2.0 * M_PI * i / 90.0;
-    const double b = 2.0 * M_PI * (i + 1) / 90.0;
-    circle.push_back({{3.0 * std::cos(a), 3.0 * std::sin(a)}, {3.0 * std::cos(b), 3.0 * std::sin(b)}});
-  }
-  EXPECT_EQ(count(circle), 0U) << "a round wall";
+  EXPECT_EQ(count(roundWall(3.0)), 0U) << "a round wall";
 }
 
 TEST(Corners, TheDerivativesByTheRanges) {
   // A little noise, so that there is one place where the walls are split best, whatever range changes.
   std::mt19937_64 random(12);
-  const LaserScan scan = simulateScan(twoWalls({3.0, 1.0}, 2.6, -1.8, 1.2), SE2(), laser(0.005), &random);
-  const auto prepared = prepare(scan);
-  const auto corners = findCorners(*prepared, CornerOptions());
+  const LaserScan scan = simulateScan(twoWalls({3.0, 1.0}, 2.6, -1.8, 1.2), SE2(), fineLaser(0.005), &random);
+  const PreparedScan prepared = prepare(scan);
+  const auto corners = findCorners(prepared, CornerOptions());
   ASSERT_EQ(corners.size(), 1U);
   const Corner& corner = corners[0];
   constexpr double kStep = 3e-4;  // ranges are floats
   for (int i = corner.first; i <= corner.last; ++i) {
-    const auto beam = static_cast<std::size_t>(prepared->points.beam[static_cast<std::size_t>(i)]);
+    const auto beam = static_cast<std::size_t>(prepared.points.beam[static_cast<std::size_t>(i)]);
     const auto at = [&](double step) {
       LaserScan changed = scan;
       changed.ranges[beam] += static_cast<float>(step);
-      const auto found = findCorners(*prepare(changed), CornerOptions());
+      const auto found = findCorners(prepare(changed), CornerOptions());
       EXPECT_EQ(found.size(), 1U);
       return found.empty() ? SE2() : found[0].base_from_corner;
     };
@@ -156,7 +132,7 @@ TEST(Corners, TheCovarianceIsThatOfTheErrors) {
   constexpr int kDraws = 2000;
   int found = 0;
   for (int i = 0; i < kDraws; ++i) {
-    PreparedScan scan = *prepare(simulateScan(world, SE2(), laser(0.02), &random));
+    PreparedScan scan = prepare(simulateScan(world, SE2(), fineLaser(0.02), &random));
     scan.range_noise = 0.02;
     const auto corners = findCorners(scan, exact());
     if (corners.size() != 1) continue;
@@ -180,32 +156,32 @@ TEST(Corners, TheCovarianceIsThatOfTheErrors) {
 }
 
 TEST(Corners, WhatWallsAreNotIsAdded) {
-  const auto scan = prepare(scanOf(twoWalls({3.0, 2.0}, M_PI, -M_PI_2)));
+  const PreparedScan scan = scanOf(twoWalls({3.0, 2.0}, M_PI, -M_PI_2));
   CornerOptions options;
   options.std_position = 0.3;
   options.std_yaw = 0.2;
-  const Matrix3d more = findCorners(*scan, options)[0].covariance - findCorners(*scan, exact())[0].covariance;
+  const Matrix3d more = findCorners(scan, options)[0].covariance - findCorners(scan, exact())[0].covariance;
   EXPECT_TRUE(matricesNear(more, Matrix3d(Vector3d(0.09, 0.09, 0.04).asDiagonal()), 1e-9));
 }
 
 TEST(Corners, WhatIsSetAsideHasNoPartInWhatIsLeft) {
-  const LaserScan scan = simulateScan(room(), SE2(), laser());
-  const auto whole = prepare(scan);
-  std::vector<bool> aside(whole->size(), false);
+  const LaserScan scan = simulateScan(room(), SE2(), fineLaser());
+  const PreparedScan whole = prepare(scan);
+  std::vector<bool> aside(whole.size(), false);
   for (std::size_t i = 100; i < 200; ++i) aside[i] = true;
-  const auto rest = setAside(*whole, aside, SurfaceOptions());
-  ASSERT_EQ(rest->size(), whole->size() - 100);
+  const auto rest = setAside(whole, aside, SurfaceOptions());
+  ASSERT_EQ(rest->size(), whole.size() - 100);
   EXPECT_EQ(rest->set_aside.size(), 100U);
   EXPECT_EQ(rest->map.size(), rest->size());
-  EXPECT_EQ(rest->beams, whole->beams);
-  EXPECT_EQ(rest->range_noise, whole->range_noise);
+  EXPECT_EQ(rest->beams, whole.beams);
+  EXPECT_EQ(rest->range_noise, whole.range_noise);
   // Ranges of theirs that are changed change nothing.
   LaserScan changed = scan;
   for (std::size_t i = 100; i < 200; ++i) {
-    changed.ranges[static_cast<std::size_t>(whole->points.beam[i])] += 0.5F;
+    changed.ranges[static_cast<std::size_t>(whole.points.beam[i])] += 0.5F;
   }
-  PreparedScan other = *prepare(changed);
-  other.range_noise = whole->range_noise;
+  PreparedScan other = prepare(changed);
+  other.range_noise = whole.range_noise;
   const auto same = setAside(other, aside, SurfaceOptions());
   ASSERT_EQ(same->size(), rest->size());
   for (std::size_t i = 0; i < rest->size(); ++i) {

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "core/matrix_matchers.h"
-#include "matching/simulated_world.h"
+#include "matching/feature_scans.h"
 #include "sckf_odometry/matching/lines.h"
 
 namespace sckf::test {
@@ -27,22 +27,6 @@ LineOptions exact() {
   options.std_offset = options.std_yaw = 0.0;
   return options;
 }
-
-SimulatedLaser laser(double noise = 0.0) {
-  SimulatedLaser laser;
-  laser.beams = 721;
-  laser.angle_increment = 2.0 * M_PI / 721.0;
-  laser.noise = noise;
-  return laser;
-}
-
-PreparedScan prepare(const LaserScan& scan) {
-  ScanOptions options;
-  options.min_points = 3;
-  return *prepareScan(scan, Eigen::Isometry3d::Identity(), options);
-}
-
-PreparedScan scanOf(const World& world) { return prepare(simulateScan(world, SE2(), laser())); }
 
 std::vector<Line> linesOf(const PreparedScan& scan, const LineOptions& options = ofOneMetre()) {
   return findLines(scan, std::vector<bool>(scan.size(), false), options);
@@ -73,7 +57,7 @@ TEST(Lines, ItsFrameIsOnTheWallAndLooksAtTheRobot) {
 TEST(Lines, FromTheOtherSideItIsAnother) {
   const World world{{{0.0, -2.0}, {0.0, 2.0}}};
   const auto of = [&](const SE2& robot) {
-    const auto lines = linesOf(prepare(simulateScan(world, robot, laser())));
+    const auto lines = linesOf(prepare(simulateScan(world, robot, fineLaser())));
     EXPECT_EQ(lines.size(), 1U);
     return compose(robot, lines.at(0).base_from_line);
   };
@@ -83,7 +67,7 @@ TEST(Lines, FromTheOtherSideItIsAnother) {
 TEST(Lines, OfARoomAllAreFoundAndNoneSharesAPoint) {
   const World world = closedPolygon({{-3, -2}, {4, -2}, {4, 3}, {-3, 3}});
   std::mt19937_64 random(7);
-  const auto lines = linesOf(prepare(simulateScan(world, SE2(), laser(0.01), &random)));
+  const auto lines = linesOf(prepare(simulateScan(world, SE2(), fineLaser(0.01), &random)));
   ASSERT_GE(lines.size(), 4U);  // that in which the scan begins and ends is two
   ASSERT_LE(lines.size(), 5U);
   double length = 0.0;
@@ -146,16 +130,10 @@ TEST(Lines, WhatIsNone) {
   EXPECT_EQ(count({{{3.0, -0.45}, {3.0, 0.45}}}, patient), 1U) << "unless short ones are allowed";
   patient.min_points = 60;
   EXPECT_EQ(count({{{3.0, -0.45}, {3.0, 0.45}}}, patient), 0U) << "of many points";
-  World circle;
-  for (int i = 0; i < 90; ++i) {
-    const double a = 2.0 * M_PI * i / 90.0;
-    const double b = 2.0 * M_PI * (i + 1) / 90.0;
-    circle.push_back({{2.0 * std::cos(a), 2.0 * std::sin(a)}, {2.0 * std::cos(b), 2.0 * std::sin(b)}});
-  }
-  EXPECT_EQ(count(circle), 0U) << "a round wall";
+  EXPECT_EQ(count(roundWall(2.0)), 0U) << "a round wall";
   LineOptions rough = exact();
   rough.roughness = 0.5;
-  EXPECT_GE(count(circle, rough), 1U) << "unless that is rough enough";
+  EXPECT_GE(count(roundWall(2.0), rough), 1U) << "unless that is rough enough";
   // Two walls that nothing joins are two lines, however well they are aligned.
   EXPECT_EQ(count({{{3.0, -3.0}, {3.0, -0.5}}, {{3.0, 0.5}, {3.0, 3.0}}}), 2U);
   // A door that is a little ajar ends the wall: no line takes in a part of it.
@@ -168,7 +146,7 @@ TEST(Lines, NoiseDoesNotCutAWall) {
   std::mt19937_64 random(5);
   int whole = 0;
   for (int i = 0; i < 100; ++i) {
-    const auto lines = linesOf(prepare(simulateScan({{{2.0, -3.0}, {2.0, 3.0}}}, SE2(), laser(0.03), &random)));
+    const auto lines = linesOf(prepare(simulateScan({{{2.0, -3.0}, {2.0, 3.0}}}, SE2(), fineLaser(0.03), &random)));
     whole += lines.size() == 1 && lines[0].to - lines[0].from > 5.5 ? 1 : 0;
   }
   EXPECT_GT(whole, 80);
@@ -176,7 +154,7 @@ TEST(Lines, NoiseDoesNotCutAWall) {
 
 TEST(Lines, TheDerivativesByTheRanges) {
   std::mt19937_64 random(12);
-  const LaserScan scan = simulateScan({{{3.0, -1.0}, {2.0, 1.5}}}, SE2(), laser(0.005), &random);
+  const LaserScan scan = simulateScan({{{3.0, -1.0}, {2.0, 1.5}}}, SE2(), fineLaser(0.005), &random);
   const PreparedScan prepared = prepare(scan);
   const auto lines = linesOf(prepared);
   ASSERT_EQ(lines.size(), 1U);
@@ -214,7 +192,7 @@ TEST(Lines, TheCovarianceIsThatOfTheErrors) {
   constexpr int kDraws = 2000;
   int found = 0;
   for (int i = 0; i < kDraws; ++i) {
-    PreparedScan scan = prepare(simulateScan(world, SE2(), laser(0.02), &random));
+    PreparedScan scan = prepare(simulateScan(world, SE2(), fineLaser(0.02), &random));
     scan.range_noise = 0.02;
     const auto lines = linesOf(scan, exact());
     if (lines.size() != 1) continue;
