@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "sckf_odometry/core/multi_clone_filter.h"
+#include "sckf_odometry/experiments/pose_nees.h"
 
 namespace sckf {
 
@@ -147,7 +148,7 @@ class Robot {
     };
     const Eigen::Vector3d e = error(truth_, filter_.pose());
     const Eigen::Matrix3d P = filter_.covariance();
-    sums.pose[scan] += nees(e, P);
+    sums.pose[scan] += poseNees(truth_, filter_.pose(), P) / runs;
     sums.squared_error[scan] += e.head<2>().squaredNorm() / runs;
     sums.squared_yaw[scan] += e.z() * e.z() / runs;
     sums.variance[scan] += P.topLeftCorner<2, 2>().trace() / runs;

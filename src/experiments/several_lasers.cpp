@@ -1,10 +1,10 @@
 #include "sckf_odometry/experiments/several_lasers.h"
 
-#include <Eigen/Cholesky>
 #include <deque>
 
 #include "sckf_odometry/core/multi_clone_filter.h"
 #include "sckf_odometry/core/odometry_model.h"
+#include "sckf_odometry/experiments/pose_nees.h"
 
 namespace sckf {
 
@@ -37,9 +37,8 @@ class Robot {
   }
 
   void note(std::size_t tick, int runs, SeveralLasersStatistics& sums) const {
-    const Eigen::Vector3d e = error(truth_, filter_.pose());
-    sums.nees[tick] += e.dot(filter_.covariance().llt().solve(e)) / runs;
-    sums.squared_error[tick] += e.head<2>().squaredNorm() / runs;
+    sums.nees[tick] += poseNees(truth_, filter_.pose(), filter_.covariance()) / runs;
+    sums.squared_error[tick] += (truth_.translation() - filter_.pose().translation()).squaredNorm() / runs;
   }
 
  private:

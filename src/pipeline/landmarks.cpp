@@ -46,7 +46,7 @@ const std::vector<std::string>& landmarkUses() {
 }
 
 std::shared_ptr<const PreparedScan> Landmarks::claim(std::shared_ptr<const PreparedScan> scan,
-                                                     const MultiCloneFilter& filter, const ReferenceOptions& reference,
+                                                     const LandmarkStates& filter, const ReferenceOptions& reference,
                                                      const SurfaceOptions& surface) {
   ++scans_;
   scan_ = std::move(scan);
@@ -68,7 +68,7 @@ std::shared_ptr<const PreparedScan> Landmarks::claim(std::shared_ptr<const Prepa
 }
 
 /// Of the sights from `first` on those that are, or may become, landmarks; their points are aside then.
-void Landmarks::claim(std::size_t first, const MultiCloneFilter& filter, const ReferenceOptions& reference,
+void Landmarks::claim(std::size_t first, const LandmarkStates& filter, const ReferenceOptions& reference,
                       std::vector<bool>& aside) {
   for (const Association& a : compatible(filter, reference, Stage::kClaim)) {
     if (a.sight >= first) sights_[a.sight].claimed = true;
@@ -103,7 +103,7 @@ void Landmarks::giveWay(std::size_t first, double left) {
   }
 }
 
-int Landmarks::update(MultiCloneFilter& filter, const ReferenceOptions& reference) {
+int Landmarks::update(LandmarkStates& filter, const ReferenceOptions& reference) {
   // The most certain first: it makes the others more certain.
   for (auto all = compatible(filter, reference, Stage::kUpdate); const Association* next = mostCertain(all, filter);
        all = compatible(filter, reference, Stage::kUpdate)) {
@@ -115,7 +115,7 @@ int Landmarks::update(MultiCloneFilter& filter, const ReferenceOptions& referenc
   return static_cast<int>(used);
 }
 
-void Landmarks::use(const Association& association, MultiCloneFilter& filter) {
+void Landmarks::use(const Association& association, LandmarkStates& filter) {
   Sight& sight = sights_[association.sight];
   Known& known = known_[association.landmark];
   filter.update(association.landmark, sight.sighting);
@@ -148,7 +148,7 @@ bool Landmarks::isOf(Stage stage, const Sight& sight) {
 /// Of what is seen and of landmarks that are free yet, those that may belong together. What is claimed before the
 /// displacement, at a pose that only the wheels tell, is looked at again after it. Of a line a scan may see several
 /// pieces.
-std::vector<Landmarks::Association> Landmarks::compatible(const MultiCloneFilter& filter,
+std::vector<Landmarks::Association> Landmarks::compatible(const LandmarkStates& filter,
                                                           const ReferenceOptions& reference, Stage stage) const {
   const double farthest = 4.0 * options_.max_std;
   std::vector<Association> all;
@@ -171,7 +171,7 @@ std::vector<Landmarks::Association> Landmarks::compatible(const MultiCloneFilter
 }
 
 /// One thing seen is not two landmarks, nor the reverse. But what a line shows on either side of a gap is both it.
-bool Landmarks::excludeEachOther(const Association& a, const Association& b, const MultiCloneFilter& filter) const {
+bool Landmarks::excludeEachOther(const Association& a, const Association& b, const LandmarkStates& filter) const {
   if ((a.sight == b.sight) == (a.landmark == b.landmark)) return false;
   if (!sights_[a.sight].shape.is_line) return true;
   if (a.sight == b.sight) return lieSideBySide(landmark(a.landmark, filter), landmark(b.landmark, filter));
@@ -180,7 +180,7 @@ bool Landmarks::excludeEachOther(const Association& a, const Association& b, con
 
 /// Of those that no other one excludes.
 const Landmarks::Association* Landmarks::mostCertain(const std::vector<Association>& all,
-                                                     const MultiCloneFilter& filter) const {
+                                                     const LandmarkStates& filter) const {
   const Association* best = nullptr;
   for (const Association& a : all) {
     const bool has_rival =
@@ -205,12 +205,12 @@ bool Landmarks::shouldSee(const Feature& in_base, double farthest) const {
   return stretchInView(in_base, scan_->points, corners_have_, farthest) > enough;
 }
 
-void Landmarks::giveUp(std::size_t landmark, MultiCloneFilter& filter) {
+void Landmarks::giveUp(std::size_t landmark, LandmarkStates& filter) {
   filter.forgetLandmark(landmark);
   known_.erase(known_.begin() + static_cast<std::ptrdiff_t>(landmark));
 }
 
-void Landmarks::giveUpMissed(MultiCloneFilter& filter, const ReferenceOptions& reference) {
+void Landmarks::giveUpMissed(LandmarkStates& filter, const ReferenceOptions& reference) {
   std::vector<bool> excused(known_.size(), false);
   for (const Association& a : compatible(filter, reference, Stage::kExcuse)) excused[a.landmark] = true;
   for (std::size_t l = known_.size(); l-- > 0;) {
@@ -221,14 +221,14 @@ void Landmarks::giveUpMissed(MultiCloneFilter& filter, const ReferenceOptions& r
   }
 }
 
-bool Landmarks::isNearLandmark(const Feature& in_odom, const MultiCloneFilter& filter) const {
+bool Landmarks::isNearLandmark(const Feature& in_odom, const LandmarkStates& filter) const {
   for (std::size_t l = 0; l < known_.size(); ++l) {
     if (areAlike(landmark(l, filter), in_odom)) return true;
   }
   return false;
 }
 
-void Landmarks::beginNew(MultiCloneFilter& filter) {
+void Landmarks::beginNew(LandmarkStates& filter) {
   for (const Sight& sight : sights_) {
     const Feature in_odom = moved(filter.pose(), sight.feature());
     if (sight.used || isNearLandmark(in_odom, filter)) continue;
@@ -261,7 +261,7 @@ void Landmarks::remember(const Feature& in_odom) {
   candidate = {in_odom, candidate.sightings + 1, scans_};
 }
 
-std::vector<LandmarkView> Landmarks::views(const MultiCloneFilter& filter) const {
+std::vector<LandmarkView> Landmarks::views(const LandmarkStates& filter) const {
   std::vector<LandmarkView> views;
   for (std::size_t l = 0; l < known_.size(); ++l) {
     const FeatureShape& shape = known_[l].shape;

@@ -55,6 +55,21 @@ void MapFilter::forget(std::size_t clone) {
   if (map_) map_->forget(clone);
 }
 
+void MapFilter::addLandmark(const Sighting& sighting) {
+  odom_->addLandmark(sighting);
+  if (map_) map_->addLandmark(sighting);
+}
+
+void MapFilter::forgetLandmark(std::size_t number) {
+  odom_->forgetLandmark(number);
+  if (map_) map_->forgetLandmark(number);
+}
+
+void MapFilter::update(std::size_t landmark, const Sighting& sighting) {
+  odom_->update(landmark, sighting);
+  if (map_) map_->update(landmark, sighting);
+}
+
 PoseOutcome MapFilter::update(const PoseMeasurement& map_from_base, double nis_bound, int max_rejected, double* nis) {
   if (nis != nullptr) *nis = 0.0;
   if (!map_) return enter(map_from_base);

@@ -48,12 +48,8 @@ void checkLasers(const PipelineOptions& options) {
 }
 
 void checkLandmarks(const PipelineOptions& options) {
-  if (options.landmarks.only && !options.landmarks.on()) {
-    throw std::invalid_argument("landmarks_only is true: expected false with landmarks \"none\"");
-  }
-  if (!options.landmarks.on() || !options.pose_updates.on) return;
-  throw std::invalid_argument("landmarks is \"" + options.landmarks.use +
-                              "\": expected \"none\" with use_pose_updates: the estimate in map has none");
+  if (!options.landmarks.only || options.landmarks.on()) return;
+  throw std::invalid_argument("landmarks_only is true: expected false with landmarks \"none\"");
 }
 
 void checkPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance) {
@@ -266,18 +262,18 @@ Displacement::MatrixDD ScanOdometry::slackAmongLasers(const Displacement& displa
   return displacement.observable * slack * displacement.observable.transpose();
 }
 
-MultiCloneFilter* ScanOdometry::landmarkFilter() const {
-  return options_.landmarks.on() ? dynamic_cast<MultiCloneFilter*>(filter_.get()) : nullptr;
+LandmarkStates* ScanOdometry::landmarkFilter() const {
+  return options_.landmarks.on() ? dynamic_cast<LandmarkStates*>(filter_.get()) : nullptr;
 }
 
 void ScanOdometry::claimLandmarks(ScanReport& report) {
-  const MultiCloneFilter* filter = landmarkFilter();
+  const LandmarkStates* filter = landmarkFilter();
   if (filter == nullptr) return;
   report.scan = landmarks_.claim(report.scan, *filter, options_.reference, options_.scan.surface);
 }
 
 void ScanOdometry::useLandmarks(ScanReport& report) {
-  MultiCloneFilter* filter = landmarkFilter();
+  LandmarkStates* filter = landmarkFilter();
   if (filter == nullptr) return;
   report.landmarks_used = landmarks_.update(*filter, options_.reference);
   report.landmarks = landmarks_.views(*filter);

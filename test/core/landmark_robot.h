@@ -1,7 +1,6 @@
 // A simulated robot that meets landmarks, for the tests of their states: whether their covariance can be believed.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -13,7 +12,7 @@
 #include "random_inputs.h"
 #include "sckf_odometry/core/multi_clone_filter.h"
 #include "sckf_odometry/core/odometry_model.h"
-#include "sckf_odometry/core/world_error.h"
+#include "sckf_odometry/experiments/pose_nees.h"
 #include "sckf_odometry/experiments/room_simulation.h"
 
 namespace sckf {
@@ -98,11 +97,7 @@ class LandmarkRobot {
   }
 
   void note(std::size_t scan, Statistics& sums) const {
-    // In ξ: a yaw known to 0.1 rad bends what is known of a place 10 m away into an arc, no ellipse in x and y.
-    const Eigen::Vector3d xi = world_error::logarithm(compose(truth_, inverse(filter_.pose())));
-    const Eigen::Matrix3d T_inverse = world_error::inverseOfAdditive(filter_.pose());
-    const Eigen::Matrix3d P = T_inverse * filter_.covariance() * T_inverse.transpose();
-    sums.pose[scan] += xi.dot(P.llt().solve(xi)) / kRuns;
+    sums.pose[scan] += poseNees(truth_, filter_.pose(), filter_.covariance()) / kRuns;
     sums.squared_error[scan] += (truth_.translation() - filter_.pose().translation()).squaredNorm() / kRuns;
     if (known_.empty()) return;
     const Sighting truth = world_.exact(between(truth_, places_[known_.back()]));

@@ -131,12 +131,6 @@ TEST(Landmarks, OnlyThemThereMustBeSome) {
   }
 }
 
-TEST(Landmarks, TheEstimateInMapHasNone) {
-  PipelineOptions options = with("corners");
-  options.pose_updates.on = true;
-  EXPECT_THROW(ScanOdometry{options}, std::invalid_argument);
-}
-
 // ---- where they are, and how many
 
 TEST(Landmarks, TheyAreTheCornersOfTheRoom) {
@@ -315,7 +309,7 @@ TEST(Landmarks, OnALoopTheSecondPassFallsOnTheFirst) {
     options.landmarks.only = only;
     if (only) options.landmarks.max_std = 0.5;
     options.landmarks.line.std_offset = options.landmarks.line.std_yaw = 0.005;  // they are straight
-    options.reference.kept = 4;  // of so short a way that none is kept when the robot comes by again
+    options.reference.kept = 4;              // of so short a way that none is kept when the robot comes by again
     options.reference.kf_dist_linear = 0.1;  // so that there is a drift to be taken back
     options.reference.kf_dist_angular = 0.3;
     options.reference.older_compared = 0;

@@ -86,6 +86,13 @@ TEST(PoseUpdates, TheEstimateInMapIsWhereTheyAre) {
       1e-9);
 }
 
+void expectSameInOdom(const Driven& one, const Driven& other) {
+  ASSERT_EQ(one.reports.size(), other.reports.size());
+  for (std::size_t i = 0; i < one.reports.size(); ++i) {
+    expectNear(one.reports[i].estimate.value(), other.reports[i].estimate.value(), 0.0);
+  }
+}
+
 TEST(PoseUpdates, TheEstimateInOdomIsWhatItIsWithoutThem) {
   const SimulatedDrive drive;
   InMap with(drive);
@@ -93,15 +100,38 @@ TEST(PoseUpdates, TheEstimateInOdomIsWhatItIsWithoutThem) {
   Driven without(drive);
   without.odometry(0);
   without.run(0, 8000);
-  ASSERT_EQ(with.reports.size(), without.reports.size());
-  for (std::size_t i = 0; i < with.reports.size(); ++i) {
-    expectNear(with.reports[i].estimate.value(), without.reports[i].estimate.value(), 0.0);
-  }
+  expectSameInOdom(with, without);
   const Estimate before = with.pipeline.latest().value();
   with.pose(7957, SE2(0.1, 0.1, 0.1));
   with.pipeline.addPose({at(7907), {SE2(1, 2, 3), 1e-4 * Eigen::Matrix3d::Identity()}});
   with.take();
   expectNear(with.pipeline.latest().value(), before, 0.0);
+}
+
+TEST(PoseUpdates, LandmarksLeadTheEstimateInMapAsTheyLeadThatInOdom) {
+  Wheels wheels;
+  wheels.yaw_per_meter = 0.1;
+  const SimulatedDrive drive(wheels);
+  PipelineOptions options;
+  options.landmarks.use = "corners";
+  options.landmarks.only = true;
+  options.landmarks.max_std = 0.5;  // the wheels alone lead from one to the next
+  Driven without(drive, options);
+  without.odometry(0);
+  options.pose_updates.on = true;
+  InMap with(drive, options);
+  for (int ms = 0; ms < 15000; ms += 1000) {
+    without.run(ms, ms + 1000);
+    with.run(ms, ms + 1000);
+    if (ms == 4000 || ms == 5000) with.pose(ms + 907);  // landmarks that are known by then, and others later
+  }
+  expectSameInOdom(with, without);
+  const ScanReport& last = with.reports.back();
+  ASSERT_GT(last.landmarks_used, 0);
+  const SE2 truth = with.truth(milliseconds(last.stamp));
+  const MapEstimate& in_map = last.in_map.value();
+  EXPECT_LT(nees(in_map, truth), 16.3) << error(truth, in_map.map_from_base).transpose();
+  EXPECT_LT(error(truth, in_map.map_from_base).head<2>().norm(), 3.0 * kStd);
 }
 
 TEST(PoseUpdates, WithoutScansTheyHoldTheRobotInMapAlone) {

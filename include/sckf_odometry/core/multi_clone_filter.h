@@ -6,21 +6,9 @@
 #include <vector>
 
 #include "sckf_odometry/core/error_state.h"
-#include "sckf_odometry/core/fusion_method.h"
+#include "sckf_odometry/core/landmark_states.h"
 
 namespace sckf {
-
-/// A landmark as one scan sees it: the pose of a frame that is fixed to it, in base_link, with the covariance of its
-/// additive error, which is independent of everything else: of ranges that nothing else uses. Of a line the frame may
-/// be anywhere along its x axis: its offset and its yaw are seen, and where along it the frame is has no error.
-struct Sighting {
-  SE2 base_from_landmark;
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  bool is_line = false;
-
-  /// The directions of x, y, yaw in base_link that are seen, d × 3: all three; of a line across it, and yaw.
-  Displacement::MatrixD3 seen() const;
-};
 
 /// An extended Kalman filter of the present pose, of every clone and, if asked for, of states that are not cloned:
 /// systematic errors of the wheels, the bias of a gyro, the heading of a compass, landmarks. The range noise of the
@@ -31,7 +19,7 @@ struct Sighting {
 ///   X̃ = T(X̂) ξ,  T = [I 𝒥p̂; 0 1].
 /// The motion of the robot leaves ξ as it is, and a displacement between two poses sees nothing but the difference of
 /// their ξ, wherever they are estimated to be: nothing that is common to all poses is ever taken for known.
-class MultiCloneFilter : public FusionMethod {
+class MultiCloneFilter : public LandmarkStates {
  public:
   MultiCloneFilter(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, const StateOptions& states = {});
 
@@ -59,17 +47,14 @@ class MultiCloneFilter : public FusionMethod {
   double updateHeading(double yaw, double variance, double nis_bound) override;
   void age(double dt) override;
 
-  /// Landmarks beside the robot (VI-5), numbered in the order in which they were added. Each is a pose, and its error
-  /// is a ξ as that of a clone: what is common to it and the robot is never taken for known either.
-  std::size_t landmarks() const { return landmarks_.size(); }
-  SE2 landmark(std::size_t number) const { return inWorld(landmarks_[number].pose); }  ///< world_from_landmark
-  Eigen::Matrix3d landmarkCovariance(std::size_t number) const;                        ///< of its additive error
-  void addLandmark(const Sighting& sighting);
-  void forgetLandmark(std::size_t number);  ///< those after it move up
-  /// What is seen less what is expected in the directions that are seen, d, with its covariance. Of a line where it is
-  /// sighted: there and not at its frame's origin it is compared.
-  Innovation innovation(std::size_t landmark, const Sighting& sighting) const;
-  void update(std::size_t landmark, const Sighting& sighting);
+  /// The error of a landmark is a ξ as that of a clone: what is common to it and the robot is never taken for known.
+  std::size_t landmarks() const override { return landmarks_.size(); }
+  SE2 landmark(std::size_t number) const override { return inWorld(landmarks_[number].pose); }
+  Eigen::Matrix3d landmarkCovariance(std::size_t number) const override;
+  void addLandmark(const Sighting& sighting) override;
+  void forgetLandmark(std::size_t number) override;
+  Innovation innovation(std::size_t landmark, const Sighting& sighting) const override;
+  void update(std::size_t landmark, const Sighting& sighting) override;
 
   /// The same robot in another world, of which only the pose there is known, to a covariance.
   void enterWorld(const PoseMeasurement& world_from_base);

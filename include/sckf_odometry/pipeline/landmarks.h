@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "sckf_odometry/core/multi_clone_filter.h"
+#include "sckf_odometry/core/landmark_states.h"
 #include "sckf_odometry/pipeline/feature.h"
 #include "sckf_odometry/pipeline/reference_policy.h"
 #include "sckf_odometry/pipeline/scan_report.h"
@@ -45,17 +45,17 @@ class Landmarks {
 
   /// Finds the corners and lines of a scan at the filter's pose and sets those aside that are, or may become,
   /// landmarks. reference, here as below: what the estimate may be off beyond its covariance.
-  std::shared_ptr<const PreparedScan> claim(std::shared_ptr<const PreparedScan> scan, const MultiCloneFilter& filter,
+  std::shared_ptr<const PreparedScan> claim(std::shared_ptr<const PreparedScan> scan, const LandmarkStates& filter,
                                             const ReferenceOptions& reference, const SurfaceOptions& surface);
 
   /// Corrects the filter by the landmarks that the scan sees again, begins new ones, gives up those that are gone.
   /// Returns how many have been used.
-  int update(MultiCloneFilter& filter, const ReferenceOptions& reference);
+  int update(LandmarkStates& filter, const ReferenceOptions& reference);
 
   /// The scan has become a reference.
   void countReference();
 
-  std::vector<LandmarkView> views(const MultiCloneFilter& filter) const;
+  std::vector<LandmarkView> views(const LandmarkStates& filter) const;
 
  private:
   /// What is known of a landmark beside its state; in the order of the filter's.
@@ -85,25 +85,25 @@ class Landmarks {
   };
   enum class Stage { kClaim, kUpdate, kExcuse };
 
-  Feature landmark(std::size_t number, const MultiCloneFilter& filter) const {
+  Feature landmark(std::size_t number, const LandmarkStates& filter) const {
     return {filter.landmark(number), known_[number].shape};
   }
-  void claim(std::size_t first, const MultiCloneFilter& filter, const ReferenceOptions& reference,
+  void claim(std::size_t first, const LandmarkStates& filter, const ReferenceOptions& reference,
              std::vector<bool>& aside);
   void giveWay(std::size_t first, double left);
   static Eigen::Matrix3d slackOf(const Known& known, const ReferenceOptions& reference);
   static bool isOf(Stage stage, const Sight& sight);
-  std::vector<Association> compatible(const MultiCloneFilter& filter, const ReferenceOptions& reference,
+  std::vector<Association> compatible(const LandmarkStates& filter, const ReferenceOptions& reference,
                                       Stage stage) const;
-  bool excludeEachOther(const Association& a, const Association& b, const MultiCloneFilter& filter) const;
-  const Association* mostCertain(const std::vector<Association>& all, const MultiCloneFilter& filter) const;
-  void use(const Association& association, MultiCloneFilter& filter);
+  bool excludeEachOther(const Association& a, const Association& b, const LandmarkStates& filter) const;
+  const Association* mostCertain(const std::vector<Association>& all, const LandmarkStates& filter) const;
+  void use(const Association& association, LandmarkStates& filter);
   const Candidate* candidateFor(const Feature& in_odom) const;
   bool shouldSee(const Feature& in_base, double farthest) const;
-  void giveUp(std::size_t landmark, MultiCloneFilter& filter);
-  void giveUpMissed(MultiCloneFilter& filter, const ReferenceOptions& reference);
-  bool isNearLandmark(const Feature& in_odom, const MultiCloneFilter& filter) const;
-  void beginNew(MultiCloneFilter& filter);
+  void giveUp(std::size_t landmark, LandmarkStates& filter);
+  void giveUpMissed(LandmarkStates& filter, const ReferenceOptions& reference);
+  bool isNearLandmark(const Feature& in_odom, const LandmarkStates& filter) const;
+  void beginNew(LandmarkStates& filter);
   void remember(const Feature& in_odom);
 
   LandmarkOptions options_;

@@ -26,10 +26,10 @@ enum class PoseOutcome {
 };
 std::string toString(PoseOutcome outcome);
 
-/// Two filters that take the same motion and the same displacements. What FusionMethod tells is of the one in odom,
-/// which stays as it would be without absolute poses: its estimate never jumps. The other one begins as its copy, put
-/// into map by the first absolute pose, and takes those that follow.
-class MapFilter : public FusionMethod {
+/// Two filters that take the same motion, the same displacements and the same landmarks. What LandmarkStates tells is
+/// of the one in odom, which stays as it would be without absolute poses: its estimate never jumps. The other one
+/// begins as its copy, put into map by the first absolute pose, and takes those that follow.
+class MapFilter : public LandmarkStates {
  public:
   explicit MapFilter(std::unique_ptr<MultiCloneFilter> odom) : odom_(std::move(odom)) {}
 
@@ -44,6 +44,12 @@ class MapFilter : public FusionMethod {
   WheelCalibration calibration() const override { return odom_->calibration(); }
   GyroBias gyroBias() const override { return odom_->gyroBias(); }
   std::size_t clones() const override { return odom_->clones(); }
+  std::size_t landmarks() const override { return odom_->landmarks(); }
+  SE2 landmark(std::size_t number) const override { return odom_->landmark(number); }
+  Eigen::Matrix3d landmarkCovariance(std::size_t number) const override { return odom_->landmarkCovariance(number); }
+  Innovation innovation(std::size_t landmark, const Sighting& sighting) const override {
+    return odom_->innovation(landmark, sighting);
+  }
 
   void propagate(const OdometryIncrement& increment) override;
   void age(double dt) override;
@@ -52,6 +58,9 @@ class MapFilter : public FusionMethod {
   double updateHeading(double yaw, double variance, double nis_bound) override;
   void clone(const Eigen::VectorXd& range_variances) override;
   void forget(std::size_t clone) override;
+  void addLandmark(const Sighting& sighting) override;
+  void forgetLandmark(std::size_t number) override;
+  void update(std::size_t landmark, const Sighting& sighting) override;
 
   /// Of base_link in map, now. Its covariance must be positive definite. nis_bound: what contradicts has a larger
   /// innovation, normalised and squared; nis, if not null, gets it.

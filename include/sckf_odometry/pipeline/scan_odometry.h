@@ -122,7 +122,7 @@ class ScanOdometry {
   bool fuse(ScanReport& report);
   void compareWithOlderReferences(ScanReport& report);
   Displacement::MatrixDD slackAmongLasers(const Displacement& displacement) const;
-  MultiCloneFilter* landmarkFilter() const;  ///< null where landmarks are not used
+  LandmarkStates* landmarkFilter() const;  ///< null where landmarks are not used
   void claimLandmarks(ScanReport& report);
   void useLandmarks(ScanReport& report);
   double gate(const Displacement& displacement) const;  ///< a larger innovation, normalised and squared, contradicts
