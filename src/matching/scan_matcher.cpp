@@ -33,12 +33,20 @@ class Search {
         prior_information_((prediction.covariance + priorFloor(options)).inverse()),
         options_(options) {}
 
-  /// From the predicted displacement; if the scans do not fall together there, from the best of other yaws too.
+  /// From the predicted displacement; if the scans do not fall together there, from the best of other yaws too; and if
+  /// they still do not by far, from wherever they may.
   std::optional<Alignment> run() const {
     std::optional<Alignment> best = align(mean_);
-    if ((best && !suspicious(*best)) || options_.search_yaw_steps == 0) return best;
-    std::optional<Alignment> other = align(bestOtherYaw());
-    if (other && (!best || other->cost < best->cost)) best.emplace(std::move(*other));
+    if (best && !suspicious(*best)) return best;
+    if (options_.search_yaw_steps > 0) {
+      std::optional<Alignment> other = align(bestOtherYaw());
+      if (other && (!best || other->cost < best->cost)) best.emplace(std::move(*other));
+    }
+    if (options_.wide_search.yaw > 0.0 && !(best && fits(*best))) {
+      std::optional<Alignment> far = farAway();
+      const double gain = kGain * static_cast<double>(current_.size());
+      if (far && (!best || pointsCost(*far) + gain < pointsCost(*best))) best.emplace(std::move(*far));
+    }
     return best;
   }
 
@@ -46,6 +54,10 @@ class Search {
   std::optional<Alignment> runNear() const { return align(mean_, true); }
 
  private:
+  static constexpr double kRough = 2.0;      // residuals of twice what noise explains
+  static constexpr double kSurprise = 16.0;  // four sigma from the prior
+  static constexpr double kGain = 0.3;       // of the points' cost, for each: for less the prior is not given up
+
   static Eigen::Matrix3d priorFloor(const MatcherOptions& options) {
     return Eigen::Vector3d(options.prior_std_translation, options.prior_std_translation, options.prior_std_yaw)
         .cwiseAbs2()
@@ -66,6 +78,14 @@ class Search {
       }
     }
     return best;
+  }
+
+  /// Wherever the scans may fall together, if the wheels have slipped: they tell hardly more then than the bounds.
+  std::optional<Alignment> farAway() const {
+    const Eigen::Vector3d bounds(options_.wide_search.translation, options_.wide_search.translation,
+                                 options_.wide_search.yaw);
+    const Search search(reference_, current_, {mean_, bounds.cwiseAbs2().asDiagonal()}, options_);
+    return search.align(widelySearched(reference_, current_, mean_, options_.wide_search));
   }
 
   SE2 icp(const SE2& start) const {
@@ -121,9 +141,14 @@ class Search {
     return problem.pairs().size() < static_cast<std::size_t>(options_.min_pairs);
   }
 
+  double pointsCost(const Alignment& alignment) const { return alignment.cost - 0.5 * alignment.surprise; }
+
+  bool fits(const Alignment& alignment) const {
+    return alignment.problem.overlap() >= options_.wide_search_below_overlap && alignment.problem.scale() <= kRough &&
+           alignment.surprise <= kSurprise;
+  }
+
   bool suspicious(const Alignment& alignment) const {
-    constexpr double kRough = 2.0;      // residuals of twice what noise explains
-    constexpr double kSurprise = 16.0;  // four sigma from the prior
     return alignment.problem.overlap() < options_.search_below_overlap || alignment.problem.scale() > kRough ||
            alignment.surprise > kSurprise;
   }

@@ -7,14 +7,10 @@
 #include <utility>
 
 #include "sckf_odometry/core/covariance.h"
-#include "sckf_odometry/pipeline/chi_squared.h"
 
 namespace sckf {
 
 namespace {
-
-/// So many scans beyond the time-out mean that the wheels are silent; one may have a wrong stamp.
-constexpr std::size_t kConfirmations = 3;
 
 using Clock = std::chrono::steady_clock;
 double secondsSince(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
@@ -55,13 +51,6 @@ void checkLandmarks(const PipelineOptions& options) {
 void checkPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance) {
   const std::string problem = problemOf(odom_from_base, covariance);
   if (!problem.empty()) throw std::invalid_argument(problem);
-}
-
-std::string describe(const Innovation& innovation, double bound) {
-  std::ostringstream text;
-  text << "normalised innovation squared " << innovation.nis() << " exceeds " << bound << " ("
-       << innovation.residual.size() << " degrees of freedom)";
-  return text.str();
 }
 
 }  // namespace
@@ -195,102 +184,6 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   return report;
 }
 
-void ScanOdometry::compareWithReference(std::size_t clone, ScanReport& report) {
-  const PreparedScan& reference = references_[clone];
-  report.reference_stamp = reference.stamp;
-  report.prediction = filter_->predictedDisplacementFrom(clone);  // (16)
-  const Clock::time_point begin = Clock::now();
-  report.match = matcher_.match(reference, *report.scan, report.prediction);  // (1)
-  report.match_time = secondsSince(begin);
-  if (report.match.displacement) report.match.displacement->clone = clone;
-  const bool used = report.match.displacement ? fuse(report) : false;  // (17)-(23)
-  if (!report.match.displacement) {
-    report.outcome = ScanOutcome::kNoMatch;
-    report.reason = toString(report.match.failure);
-  }
-  const SE2 reference_from_scan = filter_->predictedDisplacementFrom(clone).reference_from_current;
-  report.new_reference = lasers_[report.laser].policy.replaces(reference_from_scan, report.match.overlap, used);
-}
-
-bool ScanOdometry::fuse(ScanReport& report) {
-  const Displacement& displacement = *report.match.displacement;
-  const double bound = gate(displacement);
-  report.innovation = filter_->innovation(displacement);
-  report.nis_bound = bound;
-  report.outcome = ScanOutcome::kUpdated;
-  const Displacement::MatrixDD slack = slackAmongLasers(displacement);
-  const auto contradicts = [&] { return report.innovation->nis(slack) > bound; };
-  if (contradicts() && looksLikeSlip(report.match)) {
-    const Eigen::Vector3d std(options_.gate.slip_std_translation, options_.gate.slip_std_translation,
-                              options_.gate.slip_std_yaw);
-    filter_->distrustWheels(std.cwiseAbs2().asDiagonal());
-    report.innovation = filter_->innovation(displacement);
-    if (report.wheels_known) report.outcome = ScanOutcome::kSlip;
-  }
-  if (contradicts()) {
-    report.outcome = ScanOutcome::kGated;
-    report.reason = describe(*report.innovation, bound);
-    return false;
-  }
-  filter_->update(displacement, *report.innovation);
-  return true;
-}
-
-void ScanOdometry::compareWithOlderReferences(ScanReport& report) {
-  const ReferenceOptions& options = options_.reference;
-  for (const std::size_t clone : references_.worthComparing(report.laser, *filter_, options)) {
-    DisplacementPrediction prediction = filter_->predictedDisplacementFrom(clone);
-    const Eigen::Matrix3d slack = references_.slack(clone, options);
-    prediction.covariance += slack;
-    Match match = matcher_.matchNear(references_[clone], *report.scan, prediction);
-    if (!match.displacement || match.overlap < options.older_min_overlap) continue;
-    Displacement& displacement = *match.displacement;
-    displacement.clone = clone;
-    displacement.matching_noise += (options.older_inflation - 1.0) * displacement.covariance();
-    const Innovation innovation = filter_->innovation(displacement);
-    if (innovation.nis(displacement.observable * slack * displacement.observable.transpose()) > gate(displacement))
-      continue;
-    filter_->update(displacement, innovation);
-    ++report.older_references;
-  }
-}
-
-/// Another laser may have corrected the estimate just now, by a displacement whose covariance has tails.
-Displacement::MatrixDD ScanOdometry::slackAmongLasers(const Displacement& displacement) const {
-  if (options_.lasers == 1) return Displacement::MatrixDD::Zero(displacement.dimension(), displacement.dimension());
-  const Eigen::Matrix3d slack = references_.slack(displacement.clone, options_.reference);
-  return displacement.observable * slack * displacement.observable.transpose();
-}
-
-LandmarkStates* ScanOdometry::landmarkFilter() const {
-  return options_.landmarks.on() ? dynamic_cast<LandmarkStates*>(filter_.get()) : nullptr;
-}
-
-void ScanOdometry::claimLandmarks(ScanReport& report) {
-  const LandmarkStates* filter = landmarkFilter();
-  if (filter == nullptr) return;
-  report.scan = landmarks_.claim(report.scan, *filter, options_.reference, options_.scan.surface);
-}
-
-void ScanOdometry::useLandmarks(ScanReport& report) {
-  LandmarkStates* filter = landmarkFilter();
-  if (filter == nullptr) return;
-  report.landmarks_used = landmarks_.update(*filter, options_.reference);
-  report.landmarks = landmarks_.views(*filter);
-  if (!options_.landmarks.only || report.new_reference) return;
-  report.outcome = report.landmarks_used > 0 ? ScanOutcome::kUpdated : ScanOutcome::kNoMatch;
-  if (report.landmarks_used == 0) report.reason = "no landmark seen; displacements are not used";
-}
-
-double ScanOdometry::gate(const Displacement& displacement) const {
-  return chiSquared(displacement.dimension(), options_.gate.probability);
-}
-
-bool ScanOdometry::looksLikeSlip(const Match& match) const {
-  return options_.gate.trust_scans_on_slip && match.displacement->dimension() == 3 &&
-         match.overlap >= options_.gate.slip_min_overlap && match.residual_rms <= options_.gate.slip_max_residual;
-}
-
 std::optional<Estimate> ScanOdometry::latest() const {
   if (!latest_) return std::nullopt;
   return Estimate{latest_stamp_, latest_->pose(), latest_->covariance(), twist_.twist()};
@@ -350,173 +243,6 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
   landmarks_ = Landmarks(options_.landmarks);
   carried_on_.reset();
   carryOn();
-}
-
-/// The odometry at hand covers it, the filter is at its beginning.
-ScanMotion ScanOdometry::motionDuring(const WaitingScans::Entry& waiting) const {
-  ScanMotion motion;
-  Standstill standstill = standstill_;
-  for (const OdometryBuffer::Step& step : odometry_.steps(waiting.scan.stamp, waiting.end())) {
-    motion.add(filter_->refined(increment(step, standstill)).before_from_after,
-               seconds(step.to.stamp - step.from.stamp));
-  }
-  return motion;
-}
-
-/// Without scans the filter follows the wheels at a distance, so that the buffer stays small; from sample to sample, so
-/// that it makes no difference when the samples arrived. A scan that waits for the end of its sweep holds it back.
-void ScanOdometry::followAtADistance() {
-  Stamp too_old = odometry_.newest() - toDuration(options_.max_scan_delay);
-  const bool holds_back = !waiting_.empty() && waiting_.endOfOldest() > waiting_.oldest();
-  if (holds_back) too_old = std::min(too_old, waiting_.oldest());
-  if (too_old <= filter_stamp_) return;
-  odometry_.discardBefore(filter_stamp_);  // for which a sample may have come just now
-  const Stamp last = odometry_.lastUpTo(too_old);
-  takePoses(last);
-  if (last > filter_stamp_) propagateTo(last);
-  if (carried_on_stamp_ < filter_stamp_) carryOn();
-}
-
-void ScanOdometry::propagateTo(Stamp stamp) {
-  for (const OdometryBuffer::Step& step : odometry_.steps(filter_stamp_, stamp)) {
-    const OdometryIncrement motion = increment(step, standstill_);
-    const double dt = seconds(step.to.stamp - step.from.stamp);
-    filter_->propagate(motion);
-    filter_->age(dt);
-    for (const MotionMeasurement& z : motion.measured) gyro_time_ += z.bias_time;
-    if (step.guess) wheels_known_ = false;
-  }
-  filter_stamp_ = stamp;
-  odometry_.discardBefore(stamp);
-  imu_.discardBefore(stamp);
-  leaveTrail();
-}
-
-void ScanOdometry::leaveTrail() {
-  if (map_ != nullptr) trail_.add(filter_stamp_, filter_->pose(), options_.max_scan_delay);
-}
-
-void ScanOdometry::useHeading(ScanReport& report) {
-  if (!options_.imu.orientation) return;
-  const std::optional<double> yaw = imu_.takeYaw(report.stamp);
-  if (!yaw) return;
-  const double std = options_.imu.orientation_std;
-  const double bound = chiSquared(1, options_.gate.probability);
-  const bool contradicts = filter_->updateHeading(*yaw, std * std, bound) > bound;
-  report.heading = contradicts ? HeadingUse::kContradicts : HeadingUse::kUsed;
-}
-
-/// Whether there is nothing to wait for: the IMU tells, or is silent.
-bool ScanOdometry::imuTells(Stamp stamp) const {
-  if (!options_.imu.isUsed() || imu_.empty() || stamp <= imu_.newest()) return true;
-  const Stamp silent = imu_.newest() + toDuration(options_.imu.timeout);
-  return (!odometry_.empty() && odometry_.newest() > silent) || waiting_.countAfter(silent) > 0;
-}
-
-/// The newest sample of odometry of which the IMU can tell no more than it has told.
-Stamp ScanOdometry::settled() const {
-  const Stamp newest = odometry_.newest();
-  if (imuTells(newest)) return newest;
-  return std::max(carried_on_stamp_, odometry_.lastUpTo(std::max(imu_.newest(), carried_on_stamp_)));
-}
-
-void ScanOdometry::carryOn() {
-  if (!carried_on_ || carried_on_stamp_ < filter_stamp_) {
-    carried_on_.emplace(filter_->pose(), filter_->covariance());
-    carried_on_stamp_ = filter_stamp_;
-    carried_on_standstill_ = standstill_;
-  }
-  const auto carry = [this](DeadReckoning& estimate, Standstill& standstill, Stamp from, Stamp to) {
-    for (const OdometryBuffer::Step& step : odometry_.steps(from, to)) {
-      estimate.propagate(filter_->refined(increment(step, standstill)));
-    }
-  };
-  const Stamp settled = this->settled();
-  carry(*carried_on_, carried_on_standstill_, carried_on_stamp_, settled);
-  carried_on_stamp_ = settled;
-  latest_ = carried_on_;
-  Standstill standstill = carried_on_standstill_;
-  latest_stamp_ = odometry_.newest();
-  carry(*latest_, standstill, settled, latest_stamp_);
-}
-
-bool ScanOdometry::onScansAlone() const {
-  const Stamp timeout = toDuration(options_.odometry_timeout);
-  const bool alone = odometry_.endsBridged() && (!wheels_heard_ || odometry_.newest() > *wheels_heard_ + timeout);
-  return alone || (!waiting_.empty() && wheelsAreSilent());
-}
-
-bool ScanOdometry::wheelsAreSilent() const {
-  const Stamp timeout = toDuration(options_.odometry_timeout);
-  const bool alone = odometry_.endsBridged();
-  const Stamp heard = wheels_heard_.value_or(alone ? odometry_.oldest() - timeout : waiting_.oldest());
-  if (alone && waiting_.oldest() > heard + timeout && waiting_.oldest() <= odometry_.newest() + timeout) return true;
-  const auto most = static_cast<std::size_t>(options_.max_waiting_scans);
-  return waiting_.countAfter(heard + timeout) >= std::min(kConfirmations, most);
-}
-
-bool ScanOdometry::bridgeToOldestWaiting() {
-  const bool scans_tell = options_.method != "dead_reckoning";
-  if (!options_.scans_alone || !scans_tell || !wheelsAreSilent()) return false;
-  for (const Stamp stamp : {waiting_.oldest(), waiting_.endOfOldest()}) {
-    if (odometry_.empty() || stamp > odometry_.newest()) odometry_.bridge(stamp, guess());
-    if (!filter_) begin(start_, start_covariance_, stamp);
-  }
-  return true;
-}
-
-void ScanOdometry::followWheels(Stamp since) {
-  for (const OdometryBuffer::Step& step : odometry_.steps(since, odometry_.newest())) {
-    if (step.guess) continue;
-    twist_.add(filter_->refined(byWheels(step)), seconds(step.to.stamp - step.from.stamp));
-    motion_known_ = step.to.stamp;
-  }
-}
-
-/// Without wheels the twist is that of the estimate from scan to scan. The covariance leaves aside that both ends have
-/// the reference's noise in common: it is too large rather than too small.
-void ScanOdometry::followScans(Stamp since, const DisplacementPrediction& at_since, const ScanReport& report) {
-  const DisplacementPrediction now = filter_->predictedDisplacement();
-  Eigen::Matrix3d A;
-  Eigen::Matrix3d B;
-  const SE2 motion = between(at_since.reference_from_current, now.reference_from_current, &A, &B);
-  twist_.add({motion, symmetric(A * at_since.covariance * A.transpose() + B * now.covariance * B.transpose())},
-             seconds(report.stamp - since));
-  const auto& displacement = report.match.displacement;
-  if (wasUsed(report.outcome) && displacement && displacement->dimension() == 3) motion_known_ = report.stamp;
-}
-
-MotionGuess ScanOdometry::guess() const { return {twist_.twist().mean, motion_known_}; }
-
-OdometryIncrement ScanOdometry::increment(const OdometryBuffer::Step& step, Standstill& standstill) const {
-  OdometryIncrement increment = byWheels(step);
-  const SE2& motion = increment.before_from_after;
-  const double dt = seconds(step.to.stamp - step.from.stamp);
-  if (options_.imu.gyro) {
-    const std::optional<double> rotation = imu_.rotation(step.from.stamp, step.to.stamp);
-    if (rotation) increment.measured.push_back(gyroMeasurement(*rotation, motion.yaw, dt, options_.imu));
-  }
-  step.guess ? standstill.interrupt() : standstill.add(motion, dt, options_.standstill);
-  if (standstill.stands(options_.standstill)) {
-    increment.by_wheels = false;
-    increment.measured.push_back(standstillMeasurement(dt, options_.standstill));
-  }
-  return increment;
-}
-
-OdometryIncrement ScanOdometry::byWheels(const OdometryBuffer::Step& step) const {
-  if (step.guess) {
-    OdometryIncrement guessed =
-        guessedIncrement(*step.guess, step.from.stamp, step.to.stamp, options_.odometry_timeout, options_.motion);
-    guessed.by_wheels = false;
-    return guessed;
-  }
-  const SE2 motion = between(step.from.odom_from_base, step.to.odom_from_base);
-  const auto& stated = step.to.twist_covariance;
-  if (options_.prefer_twist_covariance && stated && sensibleTwistCovariance(*stated)) {
-    return statedIncrement(motion, *stated, seconds(step.to.stamp - step.from.stamp));
-  }
-  return modelledIncrement(motion, options_.odometry_noise);
 }
 
 Estimate ScanOdometry::estimate() const {

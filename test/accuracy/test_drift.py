@@ -14,7 +14,7 @@ import tempfile
 import unittest
 from dataclasses import dataclass
 from pathlib import Path
-from typing import List, Optional, Sequence
+from typing import Callable, List, Optional, Sequence
 
 import numpy as np
 
@@ -23,6 +23,7 @@ sys.path.insert(0, str(ROOT / "scripts"))
 from recording import halved, read_recording  # noqa: E402
 from revisit import closure, find_revisits  # noqa: E402
 from trajectory import Trajectory, drift, read_tum, sample  # noqa: E402
+from worse_wheels import Step, freezing, slipping, worsen  # noqa: E402
 
 BIN_DIR = Path(os.environ.get("SCKF_BIN_DIR", ROOT / "build" / "devel" / "lib" / "sckf_odometry"))
 DATASETS = Path("/usr/share/mrpt/datasets")
@@ -83,11 +84,11 @@ class DriftTest(unittest.TestCase):
     @classmethod
     def tearDownClass(cls) -> None:
         cls.folder.cleanup()
-        print(f"\n{'log':14}{'wheels alone':>24}{'measured':>24}{'at most':>24}")
+        print(f"\n{'log':24}{'wheels alone':>24}{'measured':>24}{'at most':>24}")
         for row in cls.table:
             cells = [f"{each.translation:.2f} {row.unit.replace(',', f', {each.rotation:.3f}')}"
                      for each in (row.wheels, row.measured, row.bound)]
-            print(f"{row.log:14}" + "".join(f"{cell:>24}" for cell in cells))
+            print(f"{row.log:24}" + "".join(f"{cell:>24}" for cell in cells))
 
     def path(self, name: str) -> Path:
         return Path(self.folder.name) / name
@@ -144,6 +145,22 @@ class DriftTest(unittest.TestCase):
 
     def test_freiburg_079(self) -> None:
         self.check_recorded("freiburg-079", 1.06, 0.107)
+
+    def check_worse(self, log: str, told: Callable[[List[Step]], List[Step]], percent: float, deg_per_m: float) -> None:
+        bag = recorded(log)
+        worse = self.path("worse.bag")
+        worsen(str(bag), str(worse), told)
+        self.check_drift(f"{log}, {told.__name__}", worse, bag.with_suffix(".tum"), percent, deg_per_m)
+
+    def test_wheels_that_slip_by_5_to_15_degrees(self) -> None:
+        self.check_worse("intel", slipping, 1.2, 0.09)
+        self.check_worse("aces", slipping, 1.5, 0.085)
+        self.check_worse("freiburg-079", slipping, 1.1, 0.11)
+
+    def test_wheels_that_freeze_in_turns(self) -> None:
+        self.check_worse("intel", freezing, 1.3, 0.14)
+        self.check_worse("aces", freezing, 1.5, 0.085)
+        self.check_worse("freiburg-079", freezing, 1.3, 0.15)
 
     def test_simulated_log_of_mrpt(self) -> None:
         bag, tum = self.path("simulated.bag"), self.path("simulated.tum")

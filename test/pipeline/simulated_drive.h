@@ -43,6 +43,8 @@ struct Wheels {
   double spin = 1.0;            ///< they spin: they report so many times the way made …
   int spin_from = 0;            ///< [ms] … from here …
   int spin_to = 0;              ///< [ms] … until here
+  int yaw_slip_at = -1;         ///< [ms] then they report a rotation …
+  double yaw_slip = 0.0;        ///< [rad] … that there is none of
   SE2 start = SE2(5, -3, 3.0);  ///< where the driver's own frame puts the robot at first: near the wrap of the yaw
   OdometryNoise noise{0.0, 0.0, 0.0, 0.0};
   std::uint64_t seed = 0;  ///< of the noise of wheels and laser
@@ -61,7 +63,8 @@ class SimulatedDrive {
       const bool slips = ms >= wheels.stand_still_from && ms < wheels.stand_still_to;
       const double way = motion.translation().norm();
       const double scale = wheels.scale * (ms >= wheels.spin_from && ms < wheels.spin_to ? wheels.spin : 1.0);
-      const SE2 meant(scale * motion.x, scale * motion.y, motion.yaw + wheels.yaw_per_meter * way);
+      const SE2 meant(scale * motion.x, scale * motion.y,
+                      motion.yaw + wheels.yaw_per_meter * way + (ms == wheels.yaw_slip_at ? wheels.yaw_slip : 0.0));
       const Eigen::Vector3d noise = random.drawnFrom(modelledIncrement(meant, wheels.noise).covariance);
       wheels_.push_back(slips ? wheels_.back() : compose(wheels_.back(), corrected(meant, noise)));
     }

@@ -291,6 +291,65 @@ SimulatedDrive slippingDrive() {
   return SimulatedDrive(wheels);
 }
 
+/// Ahead, then a turn of 65° to the left between two scans while it goes on, ahead again.
+SE2 sharpTurn(double t) {
+  const double turned = std::clamp((t - 2.0) / 0.4, 0.0, 1.0);
+  const double way = 0.4 * std::min(t, 2.4);
+  const double yaw = 65.0 / 180.0 * M_PI * turned;
+  return compose(SE2(-1.0 + way, -0.5, yaw), SE2(0.4 * std::max(t - 2.4, 0.0), 0.0, 0.0));
+}
+
+TEST(ScanOdometryFaults, WheelsThatFreezeInASharpTurnAreFoundOut) {
+  Wheels wheels;
+  wheels.stand_still_from = 1900;
+  wheels.stand_still_to = 2900;
+  SimulatedDrive drive(wheels, 6000, room(), sharpTurn);
+  drive.laser = frontLaser();
+  const auto lastError = [&drive](const PipelineOptions& options) {
+    Driven driven(drive, options);
+    for (int ms = 0; ms < 6000; ++ms) {
+      if (ms % 20 == 0) driven.odometry(ms);
+      if (ms % 400 == 7) driven.scan(ms);
+    }
+    driven.process();
+    return driven.latestError(5980);
+  };
+  PipelineOptions options;
+  EXPECT_LT(lastError(options).head<2>().norm(), 0.06) << lastError(options).transpose();
+  EXPECT_LT(std::abs(lastError(options).z()), 0.03);
+  options.matcher.wide_search.yaw = 0.0;
+  EXPECT_GT(std::abs(lastError(options).z()), 0.3) << "the turn is no test";
+}
+
+/// The error after a rotation that only the wheels tell of, on a way straight ahead that is 0.2 m from scan to scan.
+Eigen::Vector3d errorAfterYawSlip(const World& world, double slip) {
+  Wheels wheels;
+  wheels.yaw_slip_at = 2050;
+  wheels.yaw_slip = slip;
+  const SimulatedDrive drive(wheels, 3000, world, [](double t) { return SE2(-2.0 + 0.5 * t, 0.2, 0.1); });
+  Driven driven(drive);
+  for (int ms = 0; ms < 3000; ++ms) {
+    if (ms % 20 == 0) driven.odometry(ms);
+    if (ms % 400 == 7) driven.scan(ms);
+  }
+  return driven.latestError(2980);
+}
+
+TEST(ScanOdometryFaults, AYawThatOnlyTheWheelsTellMovesNothing) {
+  for (const double slip : {0.5, -1.2}) {
+    const Eigen::Vector3d e = errorAfterYawSlip(room(), slip);
+    EXPECT_LT(e.head<2>().norm(), 0.04) << slip << ": " << e.transpose();
+    EXPECT_LT(std::abs(e.z()), 0.02) << slip << ": " << e.transpose();
+  }
+}
+
+TEST(ScanOdometryFaults, InACorridorTooWhichDoesNotTellTheWayAlongIt) {
+  const Eigen::Vector3d e = errorAfterYawSlip({{{-40.0, 1.0}, {40.0, 1.0}}, {{-40.0, -1.0}, {40.0, -1.0}}}, 0.6);
+  EXPECT_LT(std::abs(e.y()), 0.04) << e.transpose();
+  EXPECT_LT(std::abs(e.z()), 0.02) << e.transpose();
+  EXPECT_LT(std::abs(e.x()), 0.3) << "the wheels tell as much: " << e.transpose();
+}
+
 TEST(ScanOdometryFaults, WhereTheWheelsSlipTheScansAreFollowed) {
   const SimulatedDrive drive = slippingDrive();
   Driven driven = begun(drive);

@@ -9,21 +9,24 @@
 #include "sckf_odometry/matching/alignment_problem.h"
 #include "sckf_odometry/matching/displacement_estimation.h"
 #include "sckf_odometry/matching/prepared_scan.h"
+#include "sckf_odometry/matching/wide_search.h"
 
 namespace sckf {
 
 /// How the displacement is searched for.
 struct MatcherOptions {
-  double icp_pair_distance = 0.5;       ///< [m] CICP pairs points up to this distance at its start
-  int max_iterations = 15;              ///< of the alignment after CICP
-  bool both_ways = true;                ///< match the reference with the current scan, too, and take the mean
-  double prior_std_translation = 0.05;  ///< [m] added to the prediction's std of x and y, for the pairing of points
-  double prior_std_yaw = 0.05;          ///< [rad] … and to its std of yaw
-  double search_below_overlap = 0.7;    ///< more start yaws are tried if a smaller share of the points has a partner
-  double search_yaw_step = 0.12;        ///< [rad] between the start yaws
-  int search_yaw_steps = 4;             ///< start yaws to either side of the prediction
-  int min_pairs = 20;                   ///< fewer points with a partner are "too few pairs"
-  double min_overlap = 0.1;             ///< a smaller share of the points with a partner is "no overlap"
+  double icp_pair_distance = 0.5;          ///< [m] CICP pairs points up to this distance at its start
+  int max_iterations = 15;                 ///< of the alignment after CICP
+  bool both_ways = true;                   ///< match the reference with the current scan, too, and take the mean
+  double prior_std_translation = 0.05;     ///< [m] added to the prediction's std of x and y, for the pairing of points
+  double prior_std_yaw = 0.05;             ///< [rad] … and to its std of yaw
+  double search_below_overlap = 0.7;       ///< more start yaws are tried if a smaller share of the points has a partner
+  double search_yaw_step = 0.12;           ///< [rad] between the start yaws
+  int search_yaw_steps = 4;                ///< start yaws to either side of the prediction
+  double wide_search_below_overlap = 0.5;  ///< if still fewer have one, wherever the scans may fall together
+  WideSearchOptions wide_search;
+  int min_pairs = 20;           ///< fewer points with a partner are "too few pairs"
+  double min_overlap = 0.1;     ///< a smaller share of the points with a partner is "no overlap"
   double max_refinement = 0.5;  ///< [m, rad] a larger correction of the aligned pose by the estimate is "diverged"
   PairOptions pairs;
   EstimationOptions estimation;

@@ -30,7 +30,7 @@ struct GateOptions {
   bool trust_scans_on_slip = true;    ///< where the scans match well, put the contradiction down to the wheels
   double slip_std_translation = 0.3;  ///< [m] what the wheels may have been wrong by in such an interval …
   double slip_std_yaw = 0.3;          ///< [rad] … and in yaw
-  double slip_min_overlap = 0.4;      ///< scans match well if at least this share of the points has a partner …
+  double slip_min_overlap = 0.3;      ///< scans match well if at least this share of the points has a partner …
   double slip_max_residual = 2.0;     ///< … and the weighted residuals are at most this
 };
 
@@ -120,6 +120,7 @@ class ScanOdometry {
   ScanReport take(const WaitingScans::Entry& waiting);
   void compareWithReference(std::size_t clone, ScanReport& report);
   bool fuse(ScanReport& report);
+  void followSlip(const Displacement& displacement);
   void compareWithOlderReferences(ScanReport& report);
   Displacement::MatrixDD slackAmongLasers(const Displacement& displacement) const;
   LandmarkStates* landmarkFilter() const;  ///< null where landmarks are not used

@@ -1,0 +1,21 @@
+// Where one scan may lie on another when the wheels have told of nothing like it: correlative matching (Olson, ICRA
+// 2009) of points.
+#pragma once
+
+#include "sckf_odometry/core/se2.h"
+#include "sckf_odometry/matching/prepared_scan.h"
+
+namespace sckf {
+
+struct WideSearchOptions {
+  double yaw = 1.2;          ///< [rad] to either side of the prediction; 0: no such search
+  double translation = 1.0;  ///< [m] ahead, behind and to either side of it
+};
+
+/// Of all displacements in steps of 10 cm and 2.3° about the predicted one, that at which most points of the current
+/// scan lie near points of the reference. Where the scans hardly tell, it is near the prediction. Good to about such a
+/// step, as the start of an alignment.
+SE2 widelySearched(const PreparedScan& reference, const PreparedScan& current, const SE2& predicted,
+                   const WideSearchOptions& options);
+
+}  // namespace sckf

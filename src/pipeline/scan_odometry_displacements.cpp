@@ -1,0 +1,146 @@
+// How a scan corrects the estimate: by displacements from references, by landmarks, by a heading.
+#include <Eigen/Cholesky>
+#include <sstream>
+
+#include "sckf_odometry/pipeline/chi_squared.h"
+#include "sckf_odometry/pipeline/scan_odometry.h"
+
+namespace sckf {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+std::string describe(const Innovation& innovation, double bound) {
+  std::ostringstream text;
+  text << "normalised innovation squared " << innovation.nis() << " exceeds " << bound << " ("
+       << innovation.residual.size() << " degrees of freedom)";
+  return text.str();
+}
+
+}  // namespace
+
+void ScanOdometry::compareWithReference(std::size_t clone, ScanReport& report) {
+  const PreparedScan& reference = references_[clone];
+  report.reference_stamp = reference.stamp;
+  report.prediction = filter_->predictedDisplacementFrom(clone);  // (16)
+  const Clock::time_point begin = Clock::now();
+  report.match = matcher_.match(reference, *report.scan, report.prediction);  // (1)
+  report.match_time = std::chrono::duration<double>(Clock::now() - begin).count();
+  if (report.match.displacement) report.match.displacement->clone = clone;
+  const bool used = report.match.displacement ? fuse(report) : false;  // (17)-(23)
+  if (!report.match.displacement) {
+    report.outcome = ScanOutcome::kNoMatch;
+    report.reason = toString(report.match.failure);
+  }
+  const SE2 reference_from_scan = filter_->predictedDisplacementFrom(clone).reference_from_current;
+  report.new_reference = lasers_[report.laser].policy.replaces(reference_from_scan, report.match.overlap, used);
+}
+
+bool ScanOdometry::fuse(ScanReport& report) {
+  const Displacement& displacement = *report.match.displacement;
+  const double bound = gate(displacement);
+  report.innovation = filter_->innovation(displacement);
+  report.nis_bound = bound;
+  report.outcome = ScanOutcome::kUpdated;
+  const Displacement::MatrixDD slack = slackAmongLasers(displacement);
+  const auto contradicts = [&] { return report.innovation->nis(slack) > bound; };
+  const bool slipped = contradicts() && looksLikeSlip(report.match);
+  if (slipped) {
+    const Eigen::Vector3d std(options_.gate.slip_std_translation, options_.gate.slip_std_translation,
+                              options_.gate.slip_std_yaw);
+    filter_->distrustWheels(std.cwiseAbs2().asDiagonal());
+    report.innovation = filter_->innovation(displacement);
+    if (report.wheels_known) report.outcome = ScanOutcome::kSlip;
+  }
+  if (contradicts()) {
+    report.outcome = ScanOutcome::kGated;
+    report.reason = describe(*report.innovation, bound);
+    return false;
+  }
+  if (slipped) followSlip(displacement);
+  filter_->update(displacement, slipped ? filter_->innovation(displacement) : *report.innovation);
+  return true;
+}
+
+/// Linearised about wheels that were wrong by a radian the update would miss the place. They are so uncertain now that
+/// nothing is lost by linearising it where the displacement says that the robot is, as far as that sees.
+void ScanOdometry::followSlip(const Displacement& displacement) {
+  const DisplacementPrediction prediction = filter_->predictedDisplacementFrom(displacement.clone);
+  const SE2& predicted = prediction.reference_from_current;
+  const auto& V = displacement.observable;
+  const Displacement::MatrixD3 V_P = V * prediction.covariance;
+  const Displacement::MatrixDD P_V = V_P * V.transpose();
+  const Eigen::Vector3d off =
+      V_P.transpose() * P_V.llt().solve(V * error(displacement.reference_from_current, predicted));
+  OdometryIncrement slipped{between(predicted, corrected(predicted, off)), Eigen::Matrix3d::Zero()};
+  slipped.by_wheels = false;
+  filter_->propagate(slipped);
+}
+
+void ScanOdometry::compareWithOlderReferences(ScanReport& report) {
+  const ReferenceOptions& options = options_.reference;
+  for (const std::size_t clone : references_.worthComparing(report.laser, *filter_, options)) {
+    DisplacementPrediction prediction = filter_->predictedDisplacementFrom(clone);
+    const Eigen::Matrix3d slack = references_.slack(clone, options);
+    prediction.covariance += slack;
+    Match match = matcher_.matchNear(references_[clone], *report.scan, prediction);
+    if (!match.displacement || match.overlap < options.older_min_overlap) continue;
+    Displacement& displacement = *match.displacement;
+    displacement.clone = clone;
+    displacement.matching_noise += (options.older_inflation - 1.0) * displacement.covariance();
+    const Innovation innovation = filter_->innovation(displacement);
+    if (innovation.nis(displacement.observable * slack * displacement.observable.transpose()) > gate(displacement))
+      continue;
+    filter_->update(displacement, innovation);
+    ++report.older_references;
+  }
+}
+
+/// Another laser may have corrected the estimate just now, by a displacement whose covariance has tails.
+Displacement::MatrixDD ScanOdometry::slackAmongLasers(const Displacement& displacement) const {
+  if (options_.lasers == 1) return Displacement::MatrixDD::Zero(displacement.dimension(), displacement.dimension());
+  const Eigen::Matrix3d slack = references_.slack(displacement.clone, options_.reference);
+  return displacement.observable * slack * displacement.observable.transpose();
+}
+
+LandmarkStates* ScanOdometry::landmarkFilter() const {
+  return options_.landmarks.on() ? dynamic_cast<LandmarkStates*>(filter_.get()) : nullptr;
+}
+
+void ScanOdometry::claimLandmarks(ScanReport& report) {
+  const LandmarkStates* filter = landmarkFilter();
+  if (filter == nullptr) return;
+  report.scan = landmarks_.claim(report.scan, *filter, options_.reference, options_.scan.surface);
+}
+
+void ScanOdometry::useLandmarks(ScanReport& report) {
+  LandmarkStates* filter = landmarkFilter();
+  if (filter == nullptr) return;
+  report.landmarks_used = landmarks_.update(*filter, options_.reference);
+  report.landmarks = landmarks_.views(*filter);
+  if (!options_.landmarks.only || report.new_reference) return;
+  report.outcome = report.landmarks_used > 0 ? ScanOutcome::kUpdated : ScanOutcome::kNoMatch;
+  if (report.landmarks_used == 0) report.reason = "no landmark seen; displacements are not used";
+}
+
+double ScanOdometry::gate(const Displacement& displacement) const {
+  return chiSquared(displacement.dimension(), options_.gate.probability);
+}
+
+bool ScanOdometry::looksLikeSlip(const Match& match) const {
+  return options_.gate.trust_scans_on_slip && match.displacement->dimension() >= 2 &&
+         match.overlap >= options_.gate.slip_min_overlap && match.residual_rms <= options_.gate.slip_max_residual;
+}
+
+void ScanOdometry::useHeading(ScanReport& report) {
+  if (!options_.imu.orientation) return;
+  const std::optional<double> yaw = imu_.takeYaw(report.stamp);
+  if (!yaw) return;
+  const double std = options_.imu.orientation_std;
+  const double bound = chiSquared(1, options_.gate.probability);
+  const bool contradicts = filter_->updateHeading(*yaw, std * std, bound) > bound;
+  report.heading = contradicts ? HeadingUse::kContradicts : HeadingUse::kUsed;
+}
+
+}  // namespace sckf
