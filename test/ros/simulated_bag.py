@@ -254,8 +254,8 @@ def messages(duration=45.0, mount=None, seed=1, beams=360, imu=None, path=truth,
     return sorted(out, key=lambda entry: entry[2])
 
 
-def write(path, **arguments):
-    with rosbag.Bag(path, 'w') as bag:
+def write(file, **arguments):
+    with rosbag.Bag(file, 'w') as bag:
         for topic, message, stamp in messages(**arguments):
             bag.write(topic, message, rospy.Time.from_sec(stamp))
 

@@ -27,7 +27,8 @@ def run(*command: str | Path) -> subprocess.CompletedProcess[str]:
 class ScriptsTest(unittest.TestCase):
     def test_all_are_there(self) -> None:
         names = {path.name for path in scripts("/bin/bash") + scripts("/usr/bin/python3")}
-        self.assertLessEqual({"setup", "demo", "test", "run", "evaluate", "pairs", "plot", "run_tests"}, names)
+        self.assertLessEqual({"setup", "demo", "test", "run", "calibrate_odometry", "evaluate", "pairs", "plot",
+                              "run_tests"}, names)
 
     def test_every_script_is_executable(self) -> None:
         for path in scripts("/bin/bash") + scripts("/usr/bin/python3"):

@@ -1,0 +1,152 @@
+#!/usr/bin/python3
+"""scripts/calibrate_odometry: errors that are known are found, by the numbers alone and through a bag.
+
+SCKF_BIN_DIR is the folder of the programs under test.
+"""
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+from typing import Dict, List
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "test" / "ros"), str(ROOT / "test" / "accuracy"), str(ROOT / "scripts")]
+import simulated_bag  # noqa: E402
+from wheel_calibration import calibrate  # noqa: E402
+from worse_wheels import Step, worsen  # noqa: E402
+
+BIN = Path(os.environ.get("SCKF_BIN_DIR", ROOT / "build" / "devel" / "lib" / "sckf_odometry"))
+MATCHING = np.array([0.004, 0.004, 0.002])  # std of a displacement [m, m, rad]
+
+
+def drive(errors: np.ndarray, noise: np.ndarray, seed: int, pairs: int = 2000):
+    """What wheels with these errors say of a robot that goes and turns anyhow, and what scans say: s, r, k, l, noise."""
+    random = np.random.default_rng(seed)
+    x, yaw = random.uniform(0.05, 0.5, pairs), random.uniform(-0.5, 0.5, pairs)
+    wheels = np.stack([x, random.normal(0.0, 0.01, pairs), yaw], axis=1)
+    s, r, k, ahead = errors
+    scans = np.stack([(1 + s) * wheels[:, 0] - ahead * (1 - np.cos(yaw)), (1 + s) * wheels[:, 1] + ahead * np.sin(yaw),
+                      (1 + r) * yaw + k * np.hypot(wheels[:, 0], wheels[:, 1])], axis=1)
+    way, turned = np.hypot(wheels[:, 0], wheels[:, 1]), np.abs(yaw)
+    place = np.sqrt(noise[0] ** 2 * way + noise[1] ** 2 * turned)
+    std = np.stack([place, place, np.sqrt(noise[2] ** 2 * way + noise[3] ** 2 * turned)], axis=1)
+    scans += std * random.normal(size=(pairs, 3)) + MATCHING * random.normal(size=(pairs, 3))
+    return wheels, scans, np.tile(MATCHING ** 2, (pairs, 1))
+
+
+class NumbersTest(unittest.TestCase):
+    ERRORS = np.array([-0.04, 0.03, 0.06, 0.09])
+    NOISE = np.array([0.03, 0.05, 0.06, 0.08])
+
+    def test_errors_and_noise_are_found(self) -> None:
+        normalised = []
+        for seed in range(20):
+            found = calibrate(*drive(self.ERRORS, self.NOISE, seed))
+            normalised.append((found.errors - self.ERRORS) / found.std)
+            np.testing.assert_allclose(found.noise, self.NOISE, rtol=0.2, err_msg=f"seed {seed}")
+        squares = np.mean(np.square(normalised), axis=0)
+        self.assertTrue(np.all((squares > 0.3) & (squares < 2.2)), f"the std is not that of the errors: {squares}")
+
+    def test_slips_are_nothing_systematic(self) -> None:
+        wheels, scans, matching = drive(self.ERRORS, self.NOISE, 3)
+        wheels[::25, 2] += 0.8
+        found = calibrate(wheels, scans, matching)
+        np.testing.assert_allclose(found.errors, self.ERRORS, atol=0.02)
+        np.testing.assert_allclose(found.noise, self.NOISE, rtol=0.3)
+
+    def test_what_a_log_does_not_tell_stays_open(self) -> None:
+        wheels, scans, matching = drive(self.ERRORS, self.NOISE, 4)
+        wheels[:, 2] = scans[:, 2] = 0.0  # never turns
+        found = calibrate(wheels, scans, matching)
+        self.assertGreater(found.std[1], 0.25)
+        self.assertGreater(found.std[3], 0.4)
+        self.assertLess(found.std[0], 0.01)
+
+
+def weaving(t: float) -> np.ndarray:
+    """Round the room's middle, to the left and to the right by turns."""
+    def position(time: float) -> np.ndarray:
+        u = 2 * np.pi * time / 60.0
+        return (1.0 + 0.06 * np.sin(2 * np.pi * time / 5.0)) * np.array([2.8 * np.cos(u), 2.4 * np.sin(u)])
+
+    ahead = position(t + 1e-4) - position(t - 1e-4)
+    return np.array([*position(t), np.arctan2(ahead[1], ahead[0])])
+
+
+def longer_and_turned(steps: List[Step]) -> List[Step]:
+    """Wheels that say 5 % too much, turn too far to the left with the way, and turn about a point 0.1 m behind."""
+    return [(1.05 * x, 1.05 * y - 0.1 * yaw, yaw + 0.05 * np.hypot(x, y)) for x, y, yaw in steps]
+
+
+class BagTest(unittest.TestCase):
+    folder: tempfile.TemporaryDirectory[str]
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.folder = tempfile.TemporaryDirectory()
+        simulated_bag.write(cls.path("drive.bag"), duration=60.0, path=weaving)
+        simulated_bag.write(cls.path("short.bag"), duration=3.0, path=weaving)
+        worsen(cls.path("drive.bag"), cls.path("worse.bag"), longer_and_turned)
+
+    @classmethod
+    def tearDownClass(cls) -> None:
+        cls.folder.cleanup()
+
+    @classmethod
+    def path(cls, name: str) -> str:
+        return str(Path(cls.folder.name) / name)
+
+    def calibrated(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        path = f"{BIN.parents[1]}:{os.environ.get('CMAKE_PREFIX_PATH', '')}"
+        return subprocess.run([str(ROOT / "scripts" / "calibrate_odometry"), *arguments], stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, text=True, check=False,
+                              env={**os.environ, "CMAKE_PREFIX_PATH": path})
+
+    def told(self, bag: str) -> Dict[str, float]:
+        done = self.calibrated(self.path(bag))
+        self.assertEqual(done.returncode, 0, done.stderr)
+        patterns = {"way": r"way is longer.* by +(\S+) %", "turn": r"with the way.* by +(\S+) °/m",
+                    "ahead": r"laser is farther.* by +(\S+) m"}
+        return {name: float(re.search(pattern, done.stdout).group(1)) for name, pattern in patterns.items()}
+
+    def test_the_scale_of_the_simulated_wheels(self) -> None:
+        told = self.told("drive.bag")
+        self.assertAlmostEqual(told["way"], 100 * (1 / 1.03 - 1), delta=0.6)
+        self.assertAlmostEqual(told["ahead"], 0.0, delta=0.01)
+
+    def test_worse_wheels_are_told_to_be_worse_by_as_much(self) -> None:
+        before, told = self.told("drive.bag"), self.told("worse.bag")
+        self.assertAlmostEqual(told["way"], 100 * (1 / (1.03 * 1.05) - 1), delta=0.6)
+        self.assertAlmostEqual(told["turn"] - before["turn"], -np.degrees(0.05), delta=0.4)
+        self.assertAlmostEqual(told["ahead"] - before["ahead"], 0.1, delta=0.01)
+
+    def test_the_parameters_can_be_given_to_replay(self) -> None:
+        done = self.calibrated(self.path("drive.bag"))
+        params = Path(self.path("params.yaml"))
+        params.write_text(done.stdout[done.stdout.index("# what is left"):], encoding="utf-8")
+        replay = subprocess.run([str(BIN / "replay"), self.path("drive.bag"), "--params", str(params), "--trajectory",
+                                 self.path("out.tum")],
+                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+        self.assertEqual(replay.returncode, 0, replay.stdout)
+        self.assertEqual(len(params.read_text(encoding="utf-8").strip().splitlines()), 5)
+
+    def test_too_short_a_log_is_refused(self) -> None:
+        done = self.calibrated(self.path("short.bag"))
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stderr, r"calibrate_odometry: .*short.bag: \d+ displacements .* expected 30 or more")
+
+    def test_a_bag_that_is_none(self) -> None:
+        done = self.calibrated("/no/such.bag")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("/no/such.bag", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
