@@ -70,9 +70,9 @@ void ScanOdometry::followSlip(const Displacement& displacement) {
   const SE2& predicted = prediction.reference_from_current;
   const auto& V = displacement.observable;
   const Displacement::MatrixD3 V_P = V * prediction.covariance;
-  const Displacement::MatrixDD P_V = V_P * V.transpose();
+  const Displacement::MatrixDD S = V_P * V.transpose() + displacement.covariance();
   const Eigen::Vector3d off =
-      V_P.transpose() * P_V.llt().solve(V * error(displacement.reference_from_current, predicted));
+      V_P.transpose() * S.llt().solve(V * error(displacement.reference_from_current, predicted));
   OdometryIncrement slipped{between(predicted, corrected(predicted, off)), Eigen::Matrix3d::Zero()};
   slipped.by_wheels = false;
   filter_->propagate(slipped);

@@ -350,6 +350,22 @@ TEST(ScanOdometryFaults, InACorridorTooWhichDoesNotTellTheWayAlongIt) {
   EXPECT_LT(std::abs(e.x()), 0.3) << "the wheels tell as much: " << e.transpose();
 }
 
+TEST(ScanOdometryFaults, WheelsThatCanSlipInYawAloneLeaveTheEstimateSound) {
+  Wheels wheels;
+  wheels.stand_still_to = 3000;  // nothing is told, and nothing is uncertain: the covariance of the place is zero
+  const SimulatedDrive drive(wheels, 3000, room(), [](double t) { return SE2(0.2, 0.1, 0.8 * t); });
+  PipelineOptions options;
+  options.gate.slip_std_translation = 0.0;
+  Driven driven(drive, options);
+  driven.odometry(0);
+  for (int ms = 1; ms < 3000; ++ms) {
+    if (ms % 20 == 0) driven.odometry(ms);
+    if (ms % 400 == 7) driven.scan(ms);
+  }
+  EXPECT_GE(driven.count(ScanOutcome::kSlip), 1U);
+  EXPECT_LT(std::abs(error(driven.reports.back().estimate.value().odom_from_base, drive.truth(2807)).z()), 0.02);
+}
+
 TEST(ScanOdometryFaults, WhereTheWheelsSlipTheScansAreFollowed) {
   const SimulatedDrive drive = slippingDrive();
   Driven driven = begun(drive);
