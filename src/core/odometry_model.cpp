@@ -77,7 +77,7 @@ double wheelCorrelation(const Arc& arc, const OdometryNoise& noise) {
   const double by_base = noise.translation_per_meter * arc.rotation();  // (r − l) c / 2
   const double by_way = noise.yaw_per_meter * arc.ahead();              // (r + l) c / 2
   const double larger = std::max(std::abs(by_base), std::abs(by_way));
-  return larger == 0.0 ? 0.0 : by_base * by_way / square(larger);
+  return larger == 0.0 ? 0.0 : (by_base / larger) * (by_way / larger);
 }
 
 Eigen::Matrix3d differential(const SE2& motion, const OdometryNoise& noise) {

@@ -123,6 +123,19 @@ TEST(OdometryModel, OfANameThatThereIsNotIsRefused) {
   }
 }
 
+TEST(OdometryModel, AMotionOfNextToNothingHasACovariance) {
+  for (const std::string& model : odometryModelNames()) {
+    for (const double tiny : {1e-320, 1e-188, 1e-160, 1e-30}) {
+      for (const SE2& motion :
+           {SE2(tiny, 0.0, 0.0), SE2(0.0, tiny, 0.0), SE2(0.0, 0.0, tiny), SE2(tiny, tiny, -tiny)}) {
+        const Eigen::Matrix3d Q = covarianceOf(model, motion);
+        EXPECT_TRUE(Q.allFinite()) << model << ", " << motion.vector().transpose() << "\n" << Q;
+        EXPECT_LT(Q.cwiseAbs().maxCoeff(), 1e-20);
+      }
+    }
+  }
+}
+
 TEST(OdometryModel, DifferentialStraightByHand) {
   // 2 m: ahead 0.1² · 2; to the left a quarter of it and 0.3² 2³/3 of the heading; 0.3² 2²/2 between the two.
   Eigen::Matrix3d expected;
