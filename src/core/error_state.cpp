@@ -21,8 +21,8 @@ ErrorState::Part ErrorState::place(Index size) {
   P_.bottomRows(size).setZero();
   P_.rightCols(size).setZero();
   for (auto& [scan, noise] : ranges_) {
-    noise.with_state.conservativeResize(Eigen::NoChange, P_.rows());
-    noise.with_state.rightCols(size).setZero();
+    noise.coordinates.conservativeResize(Eigen::NoChange, P_.rows());
+    noise.coordinates.rightCols(size).setZero();
   }
   return part;
 }
@@ -38,7 +38,7 @@ ErrorState::Part ErrorState::addCloneOf(Part part) {
   P_.middleRows(clone.row, clone.size) = P_.middleRows(part.row, part.size);
   P_.middleCols(clone.row, clone.size) = P_.middleCols(part.row, part.size);
   for (auto& [scan, noise] : ranges_) {
-    noise.with_state.middleCols(clone.row, clone.size) = noise.with_state.middleCols(part.row, part.size);
+    noise.coordinates.middleCols(clone.row, clone.size) = noise.coordinates.middleCols(part.row, part.size);
   }
   return clone;
 }
@@ -46,12 +46,12 @@ ErrorState::Part ErrorState::addCloneOf(Part part) {
 void ErrorState::remove(Part part) {
   P_.middleRows(part.row, part.size).setZero();
   P_.middleCols(part.row, part.size).setZero();
-  for (auto& [scan, noise] : ranges_) noise.with_state.middleCols(part.row, part.size).setZero();
+  for (auto& [scan, noise] : ranges_) noise.coordinates.middleCols(part.row, part.size).setZero();
   gaps_.push_back(part);
 }
 
 ErrorState::Ranges ErrorState::addRanges(const Eigen::VectorXd& variances) {
-  ranges_[next_ranges_] = {variances, MatrixXd::Zero(variances.size(), P_.rows())};
+  ranges_[next_ranges_] = {variances, MatrixXd(variances.size(), 0), MatrixXd(0, P_.rows())};
   return next_ranges_++;
 }
 
@@ -59,7 +59,7 @@ void ErrorState::move(Part part, const MatrixXd& B, Part by) {
   P_.middleRows(part.row, part.size) += B * P_.middleRows(by.row, by.size);
   P_.middleCols(part.row, part.size) += P_.middleCols(by.row, by.size) * B.transpose();
   for (auto& [scan, noise] : ranges_) {
-    noise.with_state.middleCols(part.row, part.size) += noise.with_state.middleCols(by.row, by.size) * B.transpose();
+    noise.coordinates.middleCols(part.row, part.size) += noise.coordinates.middleCols(by.row, by.size) * B.transpose();
   }
 }
 
@@ -69,12 +69,18 @@ MatrixXd ErrorState::Correlation::gain(Part part) const {
   return innovation.llt().solve(state.middleRows(part.row, part.size).transpose()).transpose();
 }
 
-/// E{z̃ rᵀ} of the range noise of a scan, M × d.
-MatrixXd ErrorState::correlate(const RangeNoise& noise, Ranges scan, const Measurement& m) {
-  MatrixXd P_zr = MatrixXd::Zero(noise.variances.size(), m.residual.size());
+/// C Hᵀ, q × d: what r has of the directions by the state.
+MatrixXd ErrorState::coordinates(const RangeNoise& noise, const Measurement& m) const {
+  MatrixXd of_r = MatrixXd::Zero(noise.coordinates.rows(), m.residual.size());
   for (const auto& [part, H] : m.terms) {
-    P_zr.noalias() += noise.with_state.middleCols(part.row, part.size) * H.transpose();
+    of_r.noalias() += noise.coordinates.middleCols(part.row, part.size) * H.transpose();
   }
+  return of_r;
+}
+
+/// E{z̃ rᵀ} of the range noise of a scan, M × d.
+MatrixXd ErrorState::correlate(const RangeNoise& noise, Ranges scan, const Measurement& m) const {
+  MatrixXd P_zr = noise.directions * coordinates(noise, m);
   for (const auto& [used, J] : m.ranges) {
     if (used == scan) P_zr.noalias() += noise.variances.asDiagonal() * J.transpose();
   }
@@ -84,11 +90,27 @@ MatrixXd ErrorState::correlate(const RangeNoise& noise, Ranges scan, const Measu
 ErrorState::Correlation ErrorState::correlate(const Measurement& m) const {
   Correlation out{MatrixXd::Zero(P_.rows(), m.residual.size()), m.noise};
   for (const auto& [part, H] : m.terms) out.state.noalias() += P_.middleCols(part.row, part.size) * H.transpose();
-  for (const auto& [scan, J] : m.ranges) out.state.noalias() += ranges_.at(scan).with_state.transpose() * J.transpose();
+  for (const auto& [scan, J] : m.ranges) {
+    const RangeNoise& noise = ranges_.at(scan);
+    const MatrixXd J_D = J * noise.directions;
+    out.state.noalias() += noise.coordinates.transpose() * J_D.transpose();
+  }
   for (const auto& [part, H] : m.terms) out.innovation.noalias() += H * out.state.middleRows(part.row, part.size);
   for (const auto& [scan, J] : m.ranges) out.innovation.noalias() += J * correlate(ranges_.at(scan), scan, m);
   out.innovation = symmetric(out.innovation);
   return out;
+}
+
+void ErrorState::addDirections(RangeNoise& noise, const MatrixXd& directions, const MatrixXd& coordinates) {
+  const Index q = noise.directions.cols() + directions.cols();
+  noise.directions.conservativeResize(Eigen::NoChange, q);
+  noise.directions.rightCols(directions.cols()) = directions;
+  noise.coordinates.conservativeResize(q, Eigen::NoChange);
+  noise.coordinates.bottomRows(coordinates.rows()) = coordinates;
+  const Index N = noise.coordinates.cols();
+  if (q <= 2 * N) return;
+  noise.directions *= noise.coordinates;  // N are enough; at twice as many it is seldom that they are put together
+  noise.coordinates.setIdentity(N, N);
 }
 
 std::vector<Eigen::VectorXd> ErrorState::update(const Measurement& m, const std::vector<Part>& corrected) {
@@ -100,11 +122,15 @@ std::vector<Eigen::VectorXd> ErrorState::update(const Measurement& m, const std:
     corrections.emplace_back(K.middleRows(part.row, part.size) * m.residual);
   }
   for (auto& [scan, noise] : ranges_) {
-    const MatrixXd P_zr = correlate(noise, scan, m);
+    const MatrixXd of_r = coordinates(noise, m);
     for (const Part& part : corrected) {
-      noise.with_state.middleCols(part.row, part.size).noalias() -=
-          P_zr * K.middleRows(part.row, part.size).transpose();
+      noise.coordinates.middleCols(part.row, part.size).noalias() -=
+          of_r * K.middleRows(part.row, part.size).transpose();
     }
+  }
+  for (const auto& [scan, J] : m.ranges) {
+    RangeNoise& noise = ranges_.at(scan);
+    addDirections(noise, noise.variances.asDiagonal() * J.transpose(), -K.transpose());
   }
   const MatrixXd K_P_rx = K * with_r.state.transpose();
   P_ = symmetric(P_ - K_P_rx - K_P_rx.transpose() + K * with_r.innovation * K.transpose());

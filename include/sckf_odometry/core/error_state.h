@@ -68,17 +68,22 @@ class ErrorState {
   Correlation correlate(const Measurement& measurement) const;
 
   /// Schmidt update: some parts are corrected, all others and the ranges are considered, so that their covariance among
-  /// themselves stays. Time of order N² + N ΣM. Returns what each of the corrected parts is to be corrected by.
+  /// themselves stays. Time of order N² + ΣM + NΣq, with q ≤ 2N directions of the noise of each scan that are correlated
+  /// with the state. Returns what each of the corrected parts is to be corrected by.
   std::vector<Eigen::VectorXd> update(const Measurement& measurement, const std::vector<Part>& corrected);
 
  private:
+  /// E{z̃ x̃ᵀ} = D C: measurements correlate the noise of the ranges with the state by few directions of it.
   struct RangeNoise {
-    Eigen::VectorXd variances;   // M
-    Eigen::MatrixXd with_state;  // E{z̃ x̃ᵀ}, M × N
+    Eigen::VectorXd variances;    // M
+    Eigen::MatrixXd directions;   // D, M × q
+    Eigen::MatrixXd coordinates;  // C, q × N
   };
 
   Part place(Index size);
-  static Eigen::MatrixXd correlate(const RangeNoise& noise, Ranges scan, const Measurement& measurement);
+  Eigen::MatrixXd coordinates(const RangeNoise& noise, const Measurement& measurement) const;
+  Eigen::MatrixXd correlate(const RangeNoise& noise, Ranges scan, const Measurement& measurement) const;
+  static void addDirections(RangeNoise& noise, const Eigen::MatrixXd& directions, const Eigen::MatrixXd& coordinates);
 
   Eigen::MatrixXd P_;       // N × N; rows of no part are zero
   std::vector<Part> gaps_;  // that were removed
