@@ -89,6 +89,7 @@ class Search {
   }
 
   SE2 icp(const SE2& start) const {
+    constexpr double kNearEnough = 2e-3;  // [m, rad] a step so small is its last: what comes after it is finer
     mrpt::slam::CICP icp;
     icp.options.corresponding_points_decimation = 1;
     icp.options.onlyUniqueRobust = true;
@@ -96,6 +97,7 @@ class Search {
     icp.options.skip_quality_calculation = true;
     icp.options.thresholdDist = options_.icp_pair_distance;
     icp.options.smallestThresholdDist = options_.pairs.max_distance;
+    icp.options.minAbsStep_trans = icp.options.minAbsStep_rot = kNearEnough;
     mrpt::slam::CICP::TReturnInfo info;
     const mrpt::poses::CPose2D guess(start.x, start.y, start.yaw);
     const auto mean = icp.Align(&reference_.map, &current_.map, guess, info)->getMeanVal();
@@ -105,7 +107,7 @@ class Search {
   /// CICP, then the maximum of the posterior of surfaces and prior: the prior decides which points belong together in
   /// directions that the scans hardly see, where CICP slides. Empty with too few pairs.
   std::optional<Alignment> align(const SE2& start, bool near = false) const {
-    constexpr double kSettled = 1e-4;  // [m, rad]
+    constexpr double kSettled = 1e-3;  // [m, rad] points do not change partners for less; the estimate finds the rest
     SE2 x = near ? start : icp(start);
     double distance = near ? options_.pairs.max_distance : options_.icp_pair_distance;
     for (int i = 0; i < options_.max_iterations; ++i) {
