@@ -69,7 +69,7 @@ std::vector<Eigen::Vector2d> evenlyTaken(const std::vector<Eigen::Vector2d>& poi
 SE2 widelySearched(const PreparedScan& reference, const PreparedScan& current, const SE2& predicted,
                    const WideSearchOptions& options) {
   // Of all points, so many must tell against the prediction for one of its bounds to be reached.
-  constexpr double kPriceOfBound = 0.1;
+  constexpr double kPriceOfBound = 0.2;
   const NearnessGrid grid(reference.points.point);
   const std::vector<Eigen::Vector2d> points = evenlyTaken(current.points.point);
   const int turns = static_cast<int>(options.yaw / kYawStep);
