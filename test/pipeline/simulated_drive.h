@@ -150,11 +150,11 @@ class Driven {
     process();
   }
 
-  /// Odometry at 50 Hz over (from, to], scans at 10 Hz: 7 ms after every fifth sample, so between two.
-  void run(int from, int to) {
+  /// Odometry at 50 Hz over (from, to], a scan each period [ms], 7 ms after a sample of it and so between two.
+  void run(int from, int to, int period = 100) {
     for (int ms = from + 1; ms <= to; ++ms) {
       if (ms % 20 == 0) odometry(ms);
-      if (ms % 100 == 7) scan(ms);
+      if (ms % period == 7) scan(ms);
     }
   }
 

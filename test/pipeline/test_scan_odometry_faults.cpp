@@ -307,11 +307,8 @@ TEST(ScanOdometryFaults, WheelsThatFreezeInASharpTurnAreFoundOut) {
   drive.laser = frontLaser();
   const auto lastError = [&drive](const PipelineOptions& options) {
     Driven driven(drive, options);
-    for (int ms = 0; ms < 6000; ++ms) {
-      if (ms % 20 == 0) driven.odometry(ms);
-      if (ms % 400 == 7) driven.scan(ms);
-    }
-    driven.process();
+    driven.odometry(0);
+    driven.run(0, 5980, 400);
     return driven.latestError(5980);
   };
   PipelineOptions options;
@@ -328,10 +325,8 @@ Eigen::Vector3d errorAfterYawSlip(const World& world, double slip) {
   wheels.yaw_slip = slip;
   const SimulatedDrive drive(wheels, 3000, world, [](double t) { return SE2(-2.0 + 0.5 * t, 0.2, 0.1); });
   Driven driven(drive);
-  for (int ms = 0; ms < 3000; ++ms) {
-    if (ms % 20 == 0) driven.odometry(ms);
-    if (ms % 400 == 7) driven.scan(ms);
-  }
+  driven.odometry(0);
+  driven.run(0, 2980, 400);
   return driven.latestError(2980);
 }
 
@@ -344,7 +339,7 @@ TEST(ScanOdometryFaults, AYawThatOnlyTheWheelsTellMovesNothing) {
 }
 
 TEST(ScanOdometryFaults, InACorridorTooWhichDoesNotTellTheWayAlongIt) {
-  const Eigen::Vector3d e = errorAfterYawSlip({{{-40.0, 1.0}, {40.0, 1.0}}, {{-40.0, -1.0}, {40.0, -1.0}}}, 0.6);
+  const Eigen::Vector3d e = errorAfterYawSlip(corridor(), 0.6);
   EXPECT_LT(std::abs(e.y()), 0.04) << e.transpose();
   EXPECT_LT(std::abs(e.z()), 0.02) << e.transpose();
   EXPECT_LT(std::abs(e.x()), 0.3) << "the wheels tell as much: " << e.transpose();
@@ -358,10 +353,7 @@ TEST(ScanOdometryFaults, WheelsThatCanSlipInYawAloneLeaveTheEstimateSound) {
   options.gate.slip_std_translation = 0.0;
   Driven driven(drive, options);
   driven.odometry(0);
-  for (int ms = 1; ms < 3000; ++ms) {
-    if (ms % 20 == 0) driven.odometry(ms);
-    if (ms % 400 == 7) driven.scan(ms);
-  }
+  driven.run(0, 2980, 400);
   EXPECT_GE(driven.count(ScanOutcome::kSlip), 1U);
   EXPECT_LT(std::abs(error(driven.reports.back().estimate.value().odom_from_base, drive.truth(2807)).z()), 0.02);
 }
