@@ -2,12 +2,12 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <chrono>
 #include <limits>
 
 #include "sckf_odometry/core/multi_clone_filter.h"
 #include "sckf_odometry/core/stochastic_cloning_filter.h"
 #include "sckf_odometry/experiments/random_draws.h"
+#include "sckf_odometry/pipeline/stopwatch.h"
 
 namespace sckf {
 
@@ -17,14 +17,13 @@ const OdometryIncrement kMoved{SE2(0.2, 0.0, 0.05), 1e-4 * Eigen::Matrix3d::Iden
 
 /// The fastest of some repetitions, at least three and a twentieth of a second long [s].
 double fastest(const std::function<void()>& prepare, const std::function<void()>& action) {
-  using Clock = std::chrono::steady_clock;
-  const Clock::time_point begin = Clock::now();
+  const Stopwatch all;
   double best = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < 3 || Clock::now() - begin < std::chrono::milliseconds(50); ++i) {
+  for (int i = 0; i < 3 || all.seconds() < 0.05; ++i) {
     prepare();
-    const Clock::time_point start = Clock::now();
+    const Stopwatch one;
     action();
-    best = std::min(best, std::chrono::duration<double>(Clock::now() - start).count());
+    best = std::min(best, one.seconds());
   }
   return best;
 }

@@ -7,13 +7,12 @@
 #include <utility>
 
 #include "sckf_odometry/core/covariance.h"
+#include "sckf_odometry/pipeline/stopwatch.h"
 
 namespace sckf {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-double secondsSince(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
 void checkMethod(const std::string& method) {
   if (makeFusionMethod(method, SE2(), Eigen::Matrix3d::Zero())) return;
@@ -132,7 +131,7 @@ bool ScanOdometry::olderMayCome() const {
 }
 
 ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
-  const Clock::time_point begin = Clock::now();
+  const Stopwatch stopwatch;
   const Stamp stamp = waiting.scan.stamp;
   if (!odometry_.covers(stamp))
     return notUsed(stamp, waiting.laser, ScanOutcome::kNoOdometry, "older than the odometry at hand");
@@ -180,7 +179,7 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   leaveTrail();
   carried_on_.reset();
   carryOn();
-  report.total_time = secondsSince(begin);
+  report.total_time = stopwatch.seconds();
   return report;
 }
 

@@ -4,12 +4,11 @@
 
 #include "sckf_odometry/pipeline/chi_squared.h"
 #include "sckf_odometry/pipeline/scan_odometry.h"
+#include "sckf_odometry/pipeline/stopwatch.h"
 
 namespace sckf {
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 std::string describe(const Innovation& innovation, double bound) {
   std::ostringstream text;
@@ -24,9 +23,9 @@ void ScanOdometry::compareWithReference(std::size_t clone, ScanReport& report) {
   const PreparedScan& reference = references_[clone];
   report.reference_stamp = reference.stamp;
   report.prediction = filter_->predictedDisplacementFrom(clone);  // (16)
-  const Clock::time_point begin = Clock::now();
+  const Stopwatch stopwatch;
   report.match = matcher_.match(reference, *report.scan, report.prediction);  // (1)
-  report.match_time = std::chrono::duration<double>(Clock::now() - begin).count();
+  report.match_time = stopwatch.seconds();
   if (report.match.displacement) report.match.displacement->clone = clone;
   const bool used = report.match.displacement ? fuse(report) : false;  // (17)-(23)
   if (!report.match.displacement) {

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "sckf_odometry/pipeline/scan_odometry.h"
+#include "sckf_odometry/pipeline/stopwatch.h"
 #include "sckf_odometry/ros/cloud_message.h"
 #include "sckf_odometry/ros/conversions.h"
 #include "sckf_odometry/ros/parameters.h"
@@ -93,7 +94,8 @@ void writeCsvHeader(OutputFile& file) {
       "stamp,x,y,yaw,var_x,cov_xy,cov_xyaw,var_y,cov_yyaw,var_yaw,"
       "reference_stamp,predicted_x,predicted_y,predicted_yaw,displacement_x,displacement_y,displacement_yaw,dimension,"
       "displacement_var_x,displacement_cov_xy,displacement_cov_xyaw,displacement_var_y,displacement_cov_yyaw,"
-      "displacement_var_yaw,innovation_1,innovation_2,innovation_3,nis,pairs,overlap,residual_rms,new_reference,outcome,reason\n");
+      "displacement_var_yaw,innovation_1,innovation_2,innovation_3,nis,"
+      "pairs,overlap,residual_rms,new_reference,outcome,reason\n");
 }
 
 void writePose(OutputFile& file, const SE2& pose) { file.print(",%.9f,%.9f,%.9f", pose.x, pose.y, pose.yaw); }
@@ -222,7 +224,7 @@ class Replay {
                                     arguments_.pose_update_topic};
     topics.insert(topics.end(), scan_topics_.begin(), scan_topics_.end());
     rosbag::View view(bag, rosbag::TopicQuery(topics));
-    const auto begin = std::chrono::steady_clock::now();
+    const Stopwatch stopwatch;
     ProgressBar progress(view.size());
     for (const rosbag::MessageInstance& message : view) {
       take(message);
@@ -242,7 +244,7 @@ class Replay {
     map_trajectory_.finish();
     csv_.finish();
     const double log_duration = view.size() > 0 ? (view.getEndTime() - view.getBeginTime()).toSec() : 0.0;
-    statistics_.print(log_duration, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    statistics_.print(log_duration, stopwatch.seconds());
   }
 
  private:
@@ -328,9 +330,9 @@ class Replay {
   }
 
   void process() {
-    const auto begin = std::chrono::steady_clock::now();
+    const Stopwatch stopwatch;
     const std::vector<ScanReport> reports = pipeline_.process();
-    const double time = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    const double time = stopwatch.seconds();
     for (const PoseReport& report : pipeline_.takePoseReports()) {
       if (report.reason.empty()) continue;
       std::fprintf(stderr, "pose at %s not used: %s: %s\n", decimal(report.stamp).c_str(),
