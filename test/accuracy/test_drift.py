@@ -14,7 +14,7 @@ import tempfile
 import unittest
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Callable, List, Optional, Sequence
+from typing import List, Optional, Sequence
 
 import numpy as np
 
@@ -23,7 +23,7 @@ sys.path.insert(0, str(ROOT / "scripts"))
 from recording import halved, read_recording  # noqa: E402
 from revisit import closure, find_revisits  # noqa: E402
 from trajectory import Trajectory, drift, read_tum, sample  # noqa: E402
-from worse_wheels import Step, freezing, slipping, worsen  # noqa: E402
+from worse_wheels import Told, freezing, slipping, worsen  # noqa: E402
 
 BIN_DIR = Path(os.environ.get("SCKF_BIN_DIR", ROOT / "build" / "devel" / "lib" / "sckf_odometry"))
 DATASETS = Path("/usr/share/mrpt/datasets")
@@ -146,7 +146,7 @@ class DriftTest(unittest.TestCase):
     def test_freiburg_079(self) -> None:
         self.check_recorded("freiburg-079", 1.06, 0.107)
 
-    def check_worse(self, log: str, told: Callable[[List[Step]], List[Step]], percent: float, deg_per_m: float) -> None:
+    def check_worse(self, log: str, told: Told, percent: float, deg_per_m: float) -> None:
         bag = recorded(log)
         worse = self.path("worse.bag")
         worsen(str(bag), str(worse), told)

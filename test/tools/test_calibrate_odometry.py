@@ -12,7 +12,7 @@ import sys
 import tempfile
 import unittest
 from pathlib import Path
-from typing import Dict, List
+from typing import Dict
 
 import numpy as np
 
@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "test" / "ros"), str(ROOT / "test" / "accuracy"), str(ROOT / "scripts")]
 import simulated_bag  # noqa: E402
 from wheel_calibration import calibrate  # noqa: E402
-from worse_wheels import Step, worsen  # noqa: E402
+from worse_wheels import worsen  # noqa: E402
 
 BIN = Path(os.environ.get("SCKF_BIN_DIR", ROOT / "build" / "devel" / "lib" / "sckf_odometry"))
 MATCHING = np.array([0.004, 0.004, 0.002])  # std of a displacement [m, m, rad]
@@ -80,9 +80,10 @@ def weaving(t: float) -> np.ndarray:
     return np.array([*position(t), np.arctan2(ahead[1], ahead[0])])
 
 
-def longer_and_turned(steps: List[Step]) -> List[Step]:
+def longer_and_turned(steps: np.ndarray) -> np.ndarray:
     """Wheels that say 5 % too much, turn too far to the left with the way, and turn about a point 0.1 m behind."""
-    return [(1.05 * x, 1.05 * y - 0.1 * yaw, yaw + 0.05 * np.hypot(x, y)) for x, y, yaw in steps]
+    x, y, yaw = steps.T
+    return np.stack([1.05 * x, 1.05 * y - 0.1 * yaw, yaw + 0.05 * np.hypot(x, y)], axis=1)
 
 
 class BagTest(unittest.TestCase):
