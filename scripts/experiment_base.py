@@ -1,11 +1,13 @@
 """What the experiments have in common: the programs they run, tables, pictures, and what is told of them."""
 from __future__ import annotations
 
+import csv
 import json
 import os
 import shlex
 import subprocess
 import sys
+import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Dict, List, Optional, Sequence
@@ -71,8 +73,8 @@ def find_program(name: str, bin_dir: Optional[Path]) -> Path:
     for folder in folders:
         if os.access(folder / name, os.X_OK):
             return folder / name
-    raise ExperimentError(f"{name} is not in {', '.join(map(str, folders))}: build the package and source its "
-                          "setup.bash, or say where with --bin-dir")
+    remedy = "is that what --bin-dir should be?" if bin_dir else "build the package and source its setup.bash"
+    raise ExperimentError(f"{name} is not in {', '.join(map(str, folders))}: {remedy}")
 
 
 def run(setting: Setting, name: str, arguments: Sequence[object]) -> str:
@@ -82,6 +84,17 @@ def run(setting: Setting, name: str, arguments: Sequence[object]) -> str:
     if done.returncode != 0:
         raise ExperimentError(f"{' '.join(map(shlex.quote, command))}: ended with {done.returncode}")
     return done.stdout
+
+
+def scan_table(bag: str, scan_topic: str, odom_topic: str, params: Optional[str] = None,
+               options: Sequence[object] = ()) -> List[Dict[str, str]]:
+    """What the pipeline tells of each scan of a bag: the rows of replay's table."""
+    with tempfile.TemporaryDirectory() as folder:
+        table = Path(folder) / "scans.csv"
+        arguments = [bag, "--csv", table, "--scan-topic", scan_topic, "--odom-topic", odom_topic, *options]
+        run(Setting(Path(folder)), "replay", arguments + (["--params", params] if params else []))
+        with open(table, newline="", encoding="utf-8") as file:
+            return list(csv.DictReader(file))
 
 
 def simulate(setting: Setting, name: str) -> None:

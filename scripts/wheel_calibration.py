@@ -50,7 +50,7 @@ def _errors(rows: np.ndarray, difference: np.ndarray, variance: np.ndarray) -> T
         weight = 1.0 / (variance.reshape(-1) * (1.0 + e ** 2 / (ROBUST ** 2 * variance.reshape(-1))))
         inverse = np.linalg.inv((A * weight[:, None]).T @ A + np.diag(UNKNOWN ** -2.0))
         p = inverse @ (A * weight[:, None]).T @ z
-    spread = (A * (weight * (z - A @ p))[:, None])
+    spread = A * (weight * (z - A @ p))[:, None]
     return p, np.sqrt(np.diag(inverse @ (spread.T @ spread + np.diag(UNKNOWN ** -2.0)) @ inverse))
 
 
