@@ -38,6 +38,8 @@ struct Arguments {
   std::string imu_topic = "/imu";
   std::string pose_update_topic = "/pose_update";
   std::string map_trajectory;
+  double start = 0.0;     ///< [s] after the bag's begin
+  double duration = 0.0;  ///< [s], 0: to its end
 };
 
 /// A file that is complete or not there: it gets its name when everything has been written.
@@ -95,7 +97,7 @@ void writeCsvHeader(OutputFile& file) {
       "reference_stamp,predicted_x,predicted_y,predicted_yaw,displacement_x,displacement_y,displacement_yaw,dimension,"
       "displacement_var_x,displacement_cov_xy,displacement_cov_xyaw,displacement_var_y,displacement_cov_yyaw,"
       "displacement_var_yaw,innovation_1,innovation_2,innovation_3,nis,"
-      "pairs,overlap,residual_rms,new_reference,outcome,reason\n");
+      "normalised_x,normalised_y,normalised_yaw,pairs,overlap,residual_rms,new_reference,outcome,reason\n");
 }
 
 void writePose(OutputFile& file, const SE2& pose) { file.print(",%.9f,%.9f,%.9f", pose.x, pose.y, pose.yaw); }
@@ -106,6 +108,15 @@ void writeCovariance(OutputFile& file, const Eigen::Matrix3d& P) {
 
 void writeEmpty(OutputFile& file, Eigen::Index columns) {
   for (Eigen::Index i = 0; i < columns; ++i) file.print(",");
+}
+
+/// The innovation by x, y, yaw, each divided by its std; only where all of them are seen.
+void writeNormalised(OutputFile& file, const Displacement& z, const Innovation& innovation) {
+  if (z.dimension() < 3) return writeEmpty(file, 3);
+  const Eigen::Matrix3d by_pose = Eigen::Matrix3d(z.observable).inverse();
+  const Eigen::Vector3d r = by_pose * innovation.residual;
+  const Eigen::Vector3d variance = (by_pose * innovation.covariance * by_pose.transpose()).diagonal();
+  for (Eigen::Index i = 0; i < 3; ++i) file.print(",%.9g", r(i) / std::sqrt(variance(i)));
 }
 
 /// Its covariance by x, y, yaw only where all of them are seen.
@@ -124,6 +135,7 @@ void writeDisplacement(OutputFile& file, const ScanReport& report) {
   for (Eigen::Index i = 0; i < z.dimension(); ++i) file.print(",%.9g", report.innovation->residual(i));
   writeEmpty(file, 3 - z.dimension());
   file.print(",%.9g", report.innovation->nis());
+  writeNormalised(file, z, *report.innovation);
 }
 
 void writeCsvLine(OutputFile& file, const ScanReport& report) {
@@ -137,7 +149,7 @@ void writeCsvLine(OutputFile& file, const ScanReport& report) {
   if (report.innovation) {
     writeDisplacement(file, report);
   } else {
-    writeEmpty(file, 18);
+    writeEmpty(file, 21);
   }
   file.print(",%zu,%.6f,%.6f,%d,%s,\"%s\"\n", report.match.pairs.size(), report.match.overlap,
              report.match.residual_rms, report.new_reference ? 1 : 0, toString(report.outcome).c_str(),
@@ -220,10 +232,12 @@ class Replay {
     } catch (const rosbag::BagException& exception) {
       throw std::runtime_error(arguments_.bag + ": " + exception.what());
     }
-    std::vector<std::string> topics{"/tf", "/tf_static", arguments_.odom_topic, arguments_.imu_topic,
-                                    arguments_.pose_update_topic};
+    std::vector<std::string> topics{"/tf", arguments_.odom_topic, arguments_.imu_topic, arguments_.pose_update_topic};
     topics.insert(topics.end(), scan_topics_.begin(), scan_topics_.end());
-    rosbag::View view(bag, rosbag::TopicQuery(topics));
+    const ros::Time begin = rosbag::View(bag).getBeginTime() + ros::Duration(arguments_.start);
+    const ros::Time end = arguments_.duration > 0.0 ? begin + ros::Duration(arguments_.duration) : ros::TIME_MAX;
+    rosbag::View view(bag, rosbag::TopicQuery("/tf_static"));  // holds ever after
+    view.addQuery(bag, rosbag::TopicQuery(topics), begin, end);
     const Stopwatch stopwatch;
     ProgressBar progress(view.size());
     for (const rosbag::MessageInstance& message : view) {
@@ -243,7 +257,7 @@ class Replay {
     trajectory_.finish();
     map_trajectory_.finish();
     csv_.finish();
-    const double log_duration = view.size() > 0 ? (view.getEndTime() - view.getBeginTime()).toSec() : 0.0;
+    const double log_duration = view.size() > 0 ? (view.getEndTime() - begin).toSec() : 0.0;
     statistics_.print(log_duration, stopwatch.seconds());
   }
 
@@ -376,6 +390,8 @@ std::optional<Arguments> parse(int argc, char** argv) {
      "write what became of each scan; the innovation is along the directions that the scans see, in m")
     ("params", po::value(&arguments.params), "parameter file, as config/sckf_odometry.yaml")
     ("method", po::value(&arguments.method), "instead of the parameter file's method")
+    ("start", po::value(&arguments.start), "begin so many seconds after the begin of the bag")
+    ("duration", po::value(&arguments.duration), "take no more than so many seconds of it")
     ("scan-topic", po::value(&arguments.scan_topics),
      "instead of the parameter file's scan_topics; again for each further laser")
     ("odom-topic", po::value(&arguments.odom_topic)->default_value(arguments.odom_topic), "")
@@ -398,6 +414,8 @@ std::optional<Arguments> parse(int argc, char** argv) {
   }
   po::notify(values);
   if (arguments.bag.empty()) throw po::error("a BAG is needed; see --help");
+  if (!(arguments.start >= 0.0)) throw po::error("--start: expected 0 s or more");
+  if (values.count("duration") != 0 && !(arguments.duration > 0.0)) throw po::error("--duration: expected more than 0 s");
   if (arguments.trajectory.empty() && arguments.csv.empty()) throw po::error("--trajectory or --csv is needed");
   return arguments;
 }
