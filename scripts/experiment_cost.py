@@ -31,8 +31,9 @@ def update_cost(setting: Setting) -> Result:
         paragraph("""
             Innovation and update by a displacement from the oldest clone, which corrects every state, without the
             matching. With every clone come the ranges of its scan, whose correlation with every state is kept and
-            corrected: the time is of the order of N² + N ΣM, linear in the points and quadratic in the states; one
-            matrix of all would take (N + ΣM)². The exponent is fitted to the upper half. By default 16 references are
+            corrected, by the q combinations of them that displacements were made of: the time is of the order of
+            N² + N Σq + q M, linear in the points and at most quadratic in the states; one matrix of all would take
+            (N + ΣM)². The exponent is fitted to the upper half. By default 16 references are
             kept, of each laser; what no cache holds any more costs more than its size tells."""),
         markdown_table(["what grows", "from … to", "time", "exponent"], rows)]
     return result
