@@ -62,11 +62,12 @@ WheelCalibration MultiCloneFilter::calibration() const {
 
 // ---- motion
 
-/// ∂u/∂(s, r, k)
-Matrix3d MultiCloneFilter::byCalibration(const SE2& u) {
-  Matrix3d B = Matrix3d::Zero();
+/// ∂u/∂(s, r, k, l)
+WheelCalibration::Jacobian MultiCloneFilter::byCalibration(const SE2& u) {
+  WheelCalibration::Jacobian B = WheelCalibration::Jacobian::Zero();
   B.topLeftCorner<2, 1>() = u.translation();
-  B.bottomRightCorner<1, 2>() << u.yaw, u.translation().norm();
+  B.block<1, 2>(2, 1) << u.yaw, u.translation().norm();
+  B.topRightCorner<2, 1>() << std::cos(u.yaw) - 1.0, std::sin(u.yaw);
   return B;
 }
 
@@ -96,7 +97,8 @@ void MultiCloneFilter::propagate(const OdometryIncrement& increment) {
 
 /// The wheels' noise is a part of the state while others tell of the motion.
 void MultiCloneFilter::measureMotion(const OdometryIncrement& increment, const Matrix3d& W) {
-  const Matrix3d B = increment.by_wheels ? byCalibration(increment.before_from_after) : Matrix3d::Zero().eval();
+  WheelCalibration::Jacobian B = WheelCalibration::Jacobian::Zero();
+  if (increment.by_wheels) B = byCalibration(increment.before_from_after);
   const Vector3d u = increment.before_from_after.vector();
   const auto expected = [&](const Vector3d& noise) -> Vector3d { return u + B * calibration_ + noise; };
   const auto measurement = [&](const MotionMeasurement& z, const Vector3d& noise, const std::optional<Part>& part) {
@@ -132,7 +134,7 @@ OdometryIncrement MultiCloneFilter::refined(const OdometryIncrement& increment) 
   OdometryIncrement motion = calibrated(increment);
   Matrix3d& Q = motion.covariance;
   if (calibration_error_ && increment.by_wheels) {
-    const Matrix3d B = byCalibration(increment.before_from_after);
+    const WheelCalibration::Jacobian B = byCalibration(increment.before_from_after);
     Q += symmetric(B * errors_.covariance(*calibration_error_) * B.transpose());
   }
   for (const MotionMeasurement& z : increment.measured) {
@@ -155,7 +157,7 @@ OdometryIncrement MultiCloneFilter::refined(const OdometryIncrement& increment) 
 void MultiCloneFilter::forgetCalibration(double way) {
   const double kept = std::exp(-way / options_.calibration_way);
   calibration_ *= kept;
-  errors_.move(*calibration_error_, (kept - 1.0) * Matrix3d::Identity(), *calibration_error_);
+  errors_.move(*calibration_error_, (kept - 1.0) * Eigen::Matrix4d::Identity(), *calibration_error_);
   errors_.disturb(*calibration_error_,
                   (1.0 - kept * kept) * options_.calibration_std.cwiseAbs2().asDiagonal().toDenseMatrix());
 }

@@ -32,7 +32,7 @@ class Robot {
         random_(seed),
         room_(sensors.walls, 0.03),
         filter_(corrected(truth_, random_.drawnFrom(kStart)), kStart, estimated(sensors)) {
-    calibration_ = sensors.states.calibration_std.cwiseProduct(Eigen::Vector3d(random_.gaussian(3)));
+    calibration_ = sensors.states.calibration_std.cwiseProduct(Eigen::Vector4d(random_.gaussian(4)));
     bias_ = sensors.states.gyro_bias_std * random_.gaussian();
     compass_from_world_ = random_.uniform(-3.0, 3.0);
     references_.push_back(room_.scan(truth_, random_));
@@ -90,9 +90,10 @@ class Robot {
   /// The wheels turn as they say; what the robot does differs by their systematic errors and by noise.
   OdometryIncrement drive(const SE2& by_wheels, SE2& truth) {
     const OdometryIncrement increment = modelledIncrement(by_wheels, simulatedWheelNoise());
-    const auto& [s, r, k] = std::tie(calibration_(0), calibration_(1), calibration_(2));
-    const double way = by_wheels.translation().norm();
-    truth = corrected(SE2((1.0 + s) * by_wheels.x, (1.0 + s) * by_wheels.y, (1.0 + r) * by_wheels.yaw + k * way),
+    const auto& [s, r, k, l] = std::tie(calibration_(0), calibration_(1), calibration_(2), calibration_(3));
+    const auto& [x, y, yaw] = by_wheels;
+    truth = corrected(SE2((1.0 + s) * x - l * (1.0 - std::cos(yaw)), (1.0 + s) * y + l * std::sin(yaw),
+                          (1.0 + r) * yaw + k * std::hypot(x, y)),
                       random_.drawnFrom(increment.covariance));
     return increment;
   }
@@ -105,8 +106,8 @@ class Robot {
 
   void drift(double way) {
     const double kept = std::exp(-way / sensors_.states.calibration_way);
-    const Eigen::Vector3d std = std::sqrt(1.0 - kept * kept) * sensors_.states.calibration_std;
-    calibration_ = kept * calibration_ + std.cwiseProduct(Eigen::Vector3d(random_.gaussian(3)));
+    const Eigen::Vector4d std = std::sqrt(1.0 - kept * kept) * sensors_.states.calibration_std;
+    calibration_ = kept * calibration_ + std.cwiseProduct(Eigen::Vector4d(random_.gaussian(4)));
     bias_ += std::sqrt(kDt) * sensors_.states.gyro_bias_drift * random_.gaussian();
     compass_from_world_ += std::sqrt(kDt) * sensors_.states.heading_drift * random_.gaussian();
   }
@@ -143,7 +144,7 @@ class Robot {
   }
 
   void note(std::size_t scan, int runs, SensorStatistics& sums) const {
-    const auto nees = [runs](const Eigen::Vector3d& e, const Eigen::Matrix3d& P) {
+    const auto nees = [runs](const Eigen::VectorXd& e, const Eigen::MatrixXd& P) {
       return e.dot(P.llt().solve(e)) / runs;
     };
     const Eigen::Vector3d e = error(truth_, filter_.pose());
@@ -171,7 +172,7 @@ class Robot {
   RoomSimulation room_;
   SE2 truth_{0.0, -1.0, 0.0};
   MultiCloneFilter filter_;
-  Eigen::Vector3d calibration_;
+  Eigen::Vector4d calibration_;
   double bias_ = 0.0;
   double compass_from_world_ = 0.0;
   SE2 world_from_room_;
@@ -192,7 +193,7 @@ OdometryNoise simulatedWheelNoise() {
 
 SimulatedSensors wheelsThatErr() {
   SimulatedSensors sensors;
-  sensors.states.calibration_std = Eigen::Vector3d(0.1, 0.1, 0.1);
+  sensors.states.calibration_std = Eigen::Vector4d(0.1, 0.1, 0.1, 0.1);
   sensors.states.calibration_way = 20.0;
   return sensors;
 }

@@ -5,7 +5,8 @@ namespace sckf {
 StateOptions statesFor(const CalibrationOptions& calibration, const ImuOptions& imu) {
   StateOptions states;
   if (calibration.on) {
-    states.calibration_std << calibration.distance_std, calibration.rotation_std, calibration.rotation_per_meter_std;
+    states.calibration_std << calibration.distance_std, calibration.rotation_std, calibration.rotation_per_meter_std,
+        calibration.laser_ahead_std;
     states.calibration_way = calibration.way;
   }
   if (imu.gyro) {

@@ -279,13 +279,15 @@ sckf_odometry::Status toStatus(const ScanReport& report, const std::string& meth
     status.nis_bound = report.nis_bound;
   }
   if (report.reference_stamp != Stamp(0)) status.reference_age = seconds(report.stamp - report.reference_stamp);
-  const Eigen::Vector3d calibration_std = report.calibration.covariance.diagonal().cwiseSqrt();
+  const Eigen::Vector4d calibration_std = report.calibration.covariance.diagonal().cwiseSqrt();
   status.calibration_distance = report.calibration.error(0);
   status.calibration_distance_std = calibration_std(0);
   status.calibration_rotation = report.calibration.error(1);
   status.calibration_rotation_std = calibration_std(1);
   status.calibration_rotation_per_meter = report.calibration.error(2);
   status.calibration_rotation_per_meter_std = calibration_std(2);
+  status.calibration_laser_ahead = report.calibration.error(3);
+  status.calibration_laser_ahead_std = calibration_std(3);
   status.gyro_bias = report.gyro_bias.value;
   status.gyro_bias_std = std::sqrt(report.gyro_bias.variance);
   status.gyro_time = report.gyro_time;

@@ -234,10 +234,10 @@ void Health::addPoseUpdates(const ros::Time& now, StatusWrapper& status) {
 }
 
 void Health::addCalibration(StatusWrapper& status) const {
-  const Eigen::Vector3d std = calibration_.covariance.diagonal().cwiseSqrt();
+  const Eigen::Vector4d std = calibration_.covariance.diagonal().cwiseSqrt();
   if (std.isZero(0.0)) return;
-  const char* const of[] = {"way [1]", "rotation [1]", "rotation per meter [rad/m]"};
-  for (Eigen::Index i = 0; i < 3; ++i) {
+  const char* const of[] = {"way [1]", "rotation [1]", "rotation per meter [rad/m]", "laser ahead [m]"};
+  for (Eigen::Index i = 0; i < 4; ++i) {
     status.addf(std::string("error of the wheels: ") + of[i], "%.4f +- %.4f", calibration_.error(i), std(i));
   }
 }

@@ -53,7 +53,7 @@ TEST(OtherSensors, WheelsThatAreTooLongAreFoundOut) {
   driven.odometry(0);
   driven.run(0, 30000);
   const WheelCalibration& found = driven.reports.back().calibration;
-  const Eigen::Vector3d std = found.covariance.diagonal().cwiseSqrt();
+  const Eigen::Vector4d std = found.covariance.diagonal().cwiseSqrt();
   EXPECT_NEAR(found.error(0), 1.0 / 1.05 - 1.0, 3.0 * std(0));
   EXPECT_NEAR(found.error(2), -0.05 / 1.05, 3.0 * std(2));
   EXPECT_LT(found.error(0), -0.02) << "half of it at least";
@@ -69,6 +69,42 @@ TEST(OtherSensors, WheelsThatHaveBeenFoundOutLeadABlindRobotBetter) {
   const double with = errorAfterBlindStretch(drive, options);
   EXPECT_GT(without, 0.2) << "the drive is no test: the wheels are good enough";
   EXPECT_LT(with, 0.5 * without);
+}
+
+/// A drive whose laser is farther ahead than its mount says, and the mean square of the innovation across the way.
+double acrossWithLaserAhead(const PipelineOptions& options, double ahead, WheelCalibration* found) {
+  const SimulatedDrive drive({}, 31000);
+  Eigen::Isometry3d told = drive.laser.base_from_laser;
+  told.translation().x() -= ahead;
+  Driven driven(drive, options);
+  driven.odometry(0);
+  for (int ms = 1; ms <= 30000; ++ms) {
+    if (ms % 20 == 0) driven.odometry(ms);
+    if (ms % 100 == 7) driven.pipeline.addScan(drive.scan(ms), told);
+  }
+  *found = driven.reports.back().calibration;
+  double sum = 0.0;
+  for (const ScanReport& report : driven.reports) {
+    if (!report.match.displacement) continue;
+    const Eigen::Vector3d r =
+        error(report.match.displacement->reference_from_current, report.prediction.reference_from_current);
+    sum += r.y() * r.y() / static_cast<double>(driven.reports.size());
+  }
+  return sum;
+}
+
+TEST(OtherSensors, ALaserThatIsFartherAheadThanToldIsFoundOut) {
+  PipelineOptions options;
+  WheelCalibration found;
+  const double without = acrossWithLaserAhead(options, 0.08, &found);
+  options.calibration.on = true;
+  const double with = acrossWithLaserAhead(options, 0.08, &found);
+  const double std = std::sqrt(found.covariance(3, 3));
+  EXPECT_NEAR(found.error(3), 0.08, 3.0 * std);
+  EXPECT_LT(std, 0.5 * options.calibration.laser_ahead_std);
+  EXPECT_LT(with, 0.3 * without) << "of the innovations across the way";
+  acrossWithLaserAhead(options, -0.05, &found);
+  EXPECT_NEAR(found.error(3), -0.05, 3.0 * std);
 }
 
 TEST(OtherSensors, ACalibrationThatIsOffIsNone) {

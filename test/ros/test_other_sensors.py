@@ -133,6 +133,8 @@ class OtherSensors(unittest.TestCase):
         self.assertLess(status.calibration_distance, 0.0)  # they tell 3 % too much
         self.assertLess(abs(status.calibration_distance + 0.03), 4 * status.calibration_distance_std)
         self.assertLess(status.calibration_distance_std, 0.045)
+        self.assertLess(abs(status.calibration_laser_ahead), 4 * status.calibration_laser_ahead_std)  # as TF says
+        self.assertTrue(0.0 < status.calibration_laser_ahead_std < 0.1, status.calibration_laser_ahead_std)
         self.assertIn('error of the wheels: way [1]', self.recorder.diagnostics())
 
     def test_the_heading_holds_without_scans(self):

@@ -34,10 +34,13 @@ struct PoseMeasurement {
   Eigen::Matrix3d covariance;  ///< of its additive error in x, y, yaw
 };
 
-/// Systematic errors of the wheels: the true motion is (x (1 + s), y (1 + s), yaw (1 + r) + k √(x² + y²)).
+/// Systematic errors of the wheels, and of the laser's place: where the wheels tell (x, y, yaw), the true motion is
+/// (x (1 + s) − l (1 − cos yaw), y (1 + s) + l sin yaw, yaw (1 + r) + k √(x² + y²)): the laser is farther ahead, by l, of
+/// the point about which they turn than its mount says.
 struct WheelCalibration {
-  Eigen::Vector3d error = Eigen::Vector3d::Zero();       ///< s, r, k [1, 1, rad/m]
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of what `error` errs by
+  using Jacobian = Eigen::Matrix<double, 3, 4>;          ///< of a motion x, y, yaw by s, r, k, l
+  Eigen::Vector4d error = Eigen::Vector4d::Zero();       ///< s, r, k, l [1, 1, rad/m, m]
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< of what `error` errs by
 };
 
 /// What a gyro tells of a robot that does not turn.
@@ -48,9 +51,9 @@ struct GyroBias {
 
 /// States beside the pose that are not cloned (III-F). Where a standard deviation is zero there is no such state.
 struct StateOptions {
-  /// Of s, r and k of WheelCalibration: how large they can be [1, 1, rad/m]. They are taken for stationary processes,
+  /// Of s, r, k, l of WheelCalibration: how large they can be [1, 1, rad/m, m]. They are taken for stationary processes,
   /// which forget what they were within calibration_way [m]: an error of the wheels that passes leaves nothing behind.
-  Eigen::Vector3d calibration_std = Eigen::Vector3d::Zero();
+  Eigen::Vector4d calibration_std = Eigen::Vector4d::Zero();
   double calibration_way = 100.0;
 
   double gyro_bias_std = 0.0;    ///< [rad/s] of b at the start …

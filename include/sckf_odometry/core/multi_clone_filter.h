@@ -77,7 +77,7 @@ class MultiCloneFilter : public LandmarkStates {
   SE2 inWorld(const SE2& pose) const;
   double varianceOf(const std::optional<Part>& part) const;
   OdometryIncrement calibrated(const OdometryIncrement& increment) const;
-  static Eigen::Matrix3d byCalibration(const SE2& motion);
+  static WheelCalibration::Jacobian byCalibration(const SE2& motion);
   void forgetCalibration(double way);
   void measureMotion(const OdometryIncrement& motion, const Eigen::Matrix3d& W);
   Measurement measurement(const Displacement& displacement, const Innovation& innovation) const;
@@ -98,7 +98,7 @@ class MultiCloneFilter : public LandmarkStates {
   std::vector<Clone> clones_;                  // the newest first
   std::optional<ErrorState::Ranges> present_;  // of the present scan, once it has been used
 
-  Eigen::Vector3d calibration_ = Eigen::Vector3d::Zero();
+  Eigen::Vector4d calibration_ = Eigen::Vector4d::Zero();
   std::optional<Part> calibration_error_;
   double gyro_bias_ = 0.0;  // [rad/s]
   std::optional<Part> gyro_bias_error_;

@@ -12,7 +12,8 @@ struct CalibrationOptions {
   bool on = false;
   double distance_std = 0.05;            ///< how large the error of the way can be, as a share of it …
   double rotation_std = 0.05;            ///< … that of a rotation …
-  double rotation_per_meter_std = 0.05;  ///< [rad/m] … and the rotation that goes with the way
+  double rotation_per_meter_std = 0.05;  ///< [rad/m] … the rotation that goes with the way …
+  double laser_ahead_std = 0.1;          ///< [m] … and how much farther ahead the laser is of where the wheels turn about
   double way = 100.0;                    ///< [m] within which they are forgotten
 };
 
