@@ -41,7 +41,8 @@ class Install(unittest.TestCase):
         share = 'share/sckf_odometry/'
         for name in ('lib/libsckf_odometry_core.so', 'lib/libsckf_odometry_ros.so', 'lib/sckf_odometry/replay',
                      'lib/sckf_odometry/sckf_odometry_node', 'lib/sckf_odometry/rawlog_to_bag',
-                     'lib/sckf_odometry/calibrate_odometry', 'lib/sckf_odometry/evaluate',
+                     'lib/sckf_odometry/calibrate_odometry', 'lib/sckf_odometry/consistency',
+                     'lib/sckf_odometry/evaluate',
                      'lib/sckf_odometry/pairs', 'lib/sckf_odometry/plot',
                      share + 'package.xml',
                      share + 'nodelet_plugins.xml', share + 'launch/sckf_odometry.launch',
@@ -65,9 +66,9 @@ class Install(unittest.TestCase):
         self.assertIn(self.prefix, modules)
 
     def test_the_tools_run_from_there(self):
-        for tool in ('replay', 'rawlog_to_bag', 'calibrate_odometry', 'evaluate', 'pairs', 'plot', 'experiment',
-                     'experiment_data'):
-            self.assertIn('usage', self.in_the_installed_space('%s/lib/sckf_odometry/%s --help' % (self.prefix, tool)))
+        for tool in ('replay', 'rawlog_to_bag', 'calibrate_odometry', 'consistency', 'evaluate', 'pairs', 'plot',
+                     'experiment', 'experiment_data'):
+            self.assertIn('usage', self.in_the_installed_space('rosrun sckf_odometry %s --help' % tool))
 
     def test_nothing_points_back_to_the_build(self):
         for tool in ('replay', 'sckf_odometry_node'):
