@@ -70,7 +70,7 @@ MatrixXd ErrorState::Correlation::gain(Part part) const {
 }
 
 /// C Hᵀ, q × d: what r has of the directions by the state.
-MatrixXd ErrorState::coordinates(const RangeNoise& noise, const Measurement& m) const {
+MatrixXd ErrorState::coordinates(const RangeNoise& noise, const Measurement& m) {
   MatrixXd of_r = MatrixXd::Zero(noise.coordinates.rows(), m.residual.size());
   for (const auto& [part, H] : m.terms) {
     of_r.noalias() += noise.coordinates.middleCols(part.row, part.size) * H.transpose();
@@ -79,7 +79,7 @@ MatrixXd ErrorState::coordinates(const RangeNoise& noise, const Measurement& m) 
 }
 
 /// E{z̃ rᵀ} of the range noise of a scan, M × d.
-MatrixXd ErrorState::correlate(const RangeNoise& noise, Ranges scan, const Measurement& m) const {
+MatrixXd ErrorState::correlate(const RangeNoise& noise, Ranges scan, const Measurement& m) {
   MatrixXd P_zr = noise.directions * coordinates(noise, m);
   for (const auto& [used, J] : m.ranges) {
     if (used == scan) P_zr.noalias() += noise.variances.asDiagonal() * J.transpose();

@@ -13,7 +13,6 @@ namespace sckf {
 
 namespace {
 
-
 void checkMethod(const std::string& method) {
   if (makeFusionMethod(method, SE2(), Eigen::Matrix3d::Zero())) return;
   std::string known;

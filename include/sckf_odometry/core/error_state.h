@@ -68,8 +68,9 @@ class ErrorState {
   Correlation correlate(const Measurement& measurement) const;
 
   /// Schmidt update: some parts are corrected, all others and the ranges are considered, so that their covariance among
-  /// themselves stays. Time of order N² + ΣM + NΣq, with q ≤ 2N directions of the noise of each scan that are correlated
-  /// with the state. Returns what each of the corrected parts is to be corrected by.
+  /// themselves stays. Time of order N² + N Σq + q M, with the M ranges of the scans that it is by, and q ≤ 2N directions
+  /// of each scan's noise that are correlated with the state. Returns what each of the corrected parts is to be
+  /// corrected by.
   std::vector<Eigen::VectorXd> update(const Measurement& measurement, const std::vector<Part>& corrected);
 
  private:
@@ -81,8 +82,8 @@ class ErrorState {
   };
 
   Part place(Index size);
-  Eigen::MatrixXd coordinates(const RangeNoise& noise, const Measurement& measurement) const;
-  Eigen::MatrixXd correlate(const RangeNoise& noise, Ranges scan, const Measurement& measurement) const;
+  static Eigen::MatrixXd coordinates(const RangeNoise& noise, const Measurement& measurement);
+  static Eigen::MatrixXd correlate(const RangeNoise& noise, Ranges scan, const Measurement& measurement);
   static void addDirections(RangeNoise& noise, const Eigen::MatrixXd& directions, const Eigen::MatrixXd& coordinates);
 
   Eigen::MatrixXd P_;       // N × N; rows of no part are zero
