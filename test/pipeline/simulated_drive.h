@@ -138,7 +138,7 @@ class Driven {
  public:
   explicit Driven(const SimulatedDrive& drive, const PipelineOptions& options = {}, const SE2& start = SE2(),
                   const Eigen::Matrix3d& covariance = Eigen::Matrix3d::Zero())
-      : drive_(drive), pipeline(options, start, covariance) {}
+      : drive_(drive), told_mount(drive.laser.base_from_laser), pipeline(options, start, covariance) {}
 
   void odometry(int ms) {
     pipeline.addOdometry(drive_.odometry(ms));
@@ -146,7 +146,7 @@ class Driven {
   }
   void scan(int ms) { scan(drive_.scan(ms)); }
   void scan(const LaserScan& scan) {
-    pipeline.addScan(scan, drive_.laser.base_from_laser);
+    pipeline.addScan(scan, told_mount);
     process();
   }
 
@@ -191,6 +191,7 @@ class Driven {
   const SimulatedDrive& drive_;
 
  public:
+  Eigen::Isometry3d told_mount;  ///< base_link from the laser, as the pipeline is told: the true one
   ScanOdometry pipeline;
   std::vector<ScanReport> reports;
 };

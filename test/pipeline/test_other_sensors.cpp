@@ -74,14 +74,10 @@ TEST(OtherSensors, WheelsThatHaveBeenFoundOutLeadABlindRobotBetter) {
 /// A drive whose laser is farther ahead than its mount says, and the mean square of the innovation across the way.
 double acrossWithLaserAhead(const PipelineOptions& options, double ahead, WheelCalibration* found) {
   const SimulatedDrive drive({}, 31000);
-  Eigen::Isometry3d told = drive.laser.base_from_laser;
-  told.translation().x() -= ahead;
   Driven driven(drive, options);
+  driven.told_mount.translation().x() -= ahead;
   driven.odometry(0);
-  for (int ms = 1; ms <= 30000; ++ms) {
-    if (ms % 20 == 0) driven.odometry(ms);
-    if (ms % 100 == 7) driven.pipeline.addScan(drive.scan(ms), told);
-  }
+  driven.run(0, 30000);
   *found = driven.reports.back().calibration;
   double sum = 0.0;
   for (const ScanReport& report : driven.reports) {
