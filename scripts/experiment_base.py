@@ -1,13 +1,11 @@
 """What the experiments have in common: the programs they run, tables, pictures, and what is told of them."""
 from __future__ import annotations
 
-import csv
 import json
 import os
 import shlex
 import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Dict, List, Optional, Sequence
@@ -84,17 +82,6 @@ def run(setting: Setting, name: str, arguments: Sequence[object]) -> str:
     if done.returncode != 0:
         raise ExperimentError(f"{' '.join(map(shlex.quote, command))}: ended with {done.returncode}")
     return done.stdout
-
-
-def scan_table(bag: str, scan_topic: str, odom_topic: str, params: Optional[str] = None,
-               options: Sequence[object] = ()) -> List[Dict[str, str]]:
-    """What the pipeline tells of each scan of a bag: the rows of replay's table."""
-    with tempfile.TemporaryDirectory() as folder:
-        table = Path(folder) / "scans.csv"
-        arguments = [bag, "--csv", table, "--scan-topic", scan_topic, "--odom-topic", odom_topic, *options]
-        run(Setting(Path(folder)), "replay", arguments + (["--params", params] if params else []))
-        with open(table, newline="", encoding="utf-8") as file:
-            return list(csv.DictReader(file))
 
 
 def simulate(setting: Setting, name: str) -> None:

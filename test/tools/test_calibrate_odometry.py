@@ -5,11 +5,9 @@ SCKF_BIN_DIR is the folder of the programs under test.
 """
 from __future__ import annotations
 
-import os
 import re
 import subprocess
 import sys
-import tempfile
 import unittest
 from pathlib import Path
 from typing import Dict
@@ -19,10 +17,10 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "test" / "ros"), str(ROOT / "test" / "accuracy"), str(ROOT / "scripts")]
 import simulated_bag  # noqa: E402
+from script_case import BIN, ScriptCase  # noqa: E402
 from wheel_calibration import calibrate  # noqa: E402
 from worse_wheels import worsen  # noqa: E402
 
-BIN = Path(os.environ.get("SCKF_BIN_DIR", ROOT / "build" / "devel" / "lib" / "sckf_odometry"))
 MATCHING = np.array([0.004, 0.004, 0.002])  # std of a displacement [m, m, rad]
 
 
@@ -86,36 +84,21 @@ def longer_and_turned(steps: np.ndarray) -> np.ndarray:
     return np.stack([1.05 * x, 1.05 * y - 0.1 * yaw, yaw + 0.05 * np.hypot(x, y)], axis=1)
 
 
-class BagTest(unittest.TestCase):
-    folder: tempfile.TemporaryDirectory[str]
+class BagTest(ScriptCase):
+    SCRIPT = "calibrate_odometry"
 
     @classmethod
     def setUpClass(cls) -> None:
-        cls.folder = tempfile.TemporaryDirectory()
+        super().setUpClass()
         simulated_bag.write(cls.path("drive.bag"), duration=60.0, path=weaving)
         simulated_bag.write(cls.path("short.bag"), duration=3.0, path=weaving)
         worsen(cls.path("drive.bag"), cls.path("worse.bag"), longer_and_turned)
 
-    @classmethod
-    def tearDownClass(cls) -> None:
-        cls.folder.cleanup()
-
-    @classmethod
-    def path(cls, name: str) -> str:
-        return str(Path(cls.folder.name) / name)
-
-    def calibrated(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        path = f"{BIN.parents[1]}:{os.environ.get('CMAKE_PREFIX_PATH', '')}"
-        return subprocess.run([str(ROOT / "scripts" / "calibrate_odometry"), *arguments], stdout=subprocess.PIPE,
-                              stderr=subprocess.PIPE, text=True, check=False,
-                              env={**os.environ, "CMAKE_PREFIX_PATH": path})
-
     def told(self, bag: str) -> Dict[str, float]:
-        done = self.calibrated(self.path(bag))
-        self.assertEqual(done.returncode, 0, done.stderr)
+        said = self.said(self.path(bag))
         patterns = {"way": r"way is longer.* by +(\S+) %", "turn": r"with the way.* by +(\S+) °/m",
                     "ahead": r"laser is farther.* by +(\S+) m"}
-        return {name: float(re.search(pattern, done.stdout).group(1)) for name, pattern in patterns.items()}
+        return {name: float(re.search(pattern, said).group(1)) for name, pattern in patterns.items()}
 
     def test_the_scale_of_the_simulated_wheels(self) -> None:
         told = self.told("drive.bag")
@@ -129,9 +112,9 @@ class BagTest(unittest.TestCase):
         self.assertAlmostEqual(told["ahead"] - before["ahead"], 0.1, delta=0.01)
 
     def test_the_parameters_can_be_given_to_replay(self) -> None:
-        done = self.calibrated(self.path("drive.bag"))
+        said = self.said(self.path("drive.bag"))
         params = Path(self.path("params.yaml"))
-        params.write_text(done.stdout[done.stdout.index("# what is left"):], encoding="utf-8")
+        params.write_text(said[said.index("# what is left"):], encoding="utf-8")
         replay = subprocess.run([str(BIN / "replay"), self.path("drive.bag"), "--params", str(params), "--trajectory",
                                  self.path("out.tum")],
                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
@@ -139,12 +122,12 @@ class BagTest(unittest.TestCase):
         self.assertEqual(len(params.read_text(encoding="utf-8").strip().splitlines()), 5)
 
     def test_too_short_a_log_is_refused(self) -> None:
-        done = self.calibrated(self.path("short.bag"))
+        done = self.run_script(self.path("short.bag"))
         self.assertEqual(done.returncode, 1)
         self.assertRegex(done.stderr, r"calibrate_odometry: .*short.bag: \d+ displacements .* expected 30 or more")
 
     def test_a_bag_that_is_none(self) -> None:
-        done = self.calibrated("/no/such.bag")
+        done = self.run_script("/no/such.bag")
         self.assertEqual(done.returncode, 1)
         self.assertIn("/no/such.bag", done.stderr)
 

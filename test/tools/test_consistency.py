@@ -7,11 +7,8 @@ from __future__ import annotations
 
 import importlib.machinery
 import importlib.util
-import os
 import re
-import subprocess
 import sys
-import tempfile
 import unittest
 from pathlib import Path
 from typing import Dict, List, Tuple
@@ -21,9 +18,9 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "test" / "ros"), str(ROOT / "scripts")]
 import simulated_bag  # noqa: E402
-from trajectory import Trajectory, between, compose, write_tum  # noqa: E402
+from script_case import ScriptCase  # noqa: E402
+from trajectory import Trajectory, compose, write_tum  # noqa: E402
 
-BIN = Path(os.environ.get("SCKF_BIN_DIR", ROOT / "build" / "devel" / "lib" / "sckf_odometry"))
 SCRIPT = ROOT / "scripts" / "consistency"
 STEP_STD = np.array([0.01, 0.01, 0.01])  # [m, m, rad]
 START_STD = np.array([0.05, 0.03, 0.08])
@@ -102,12 +99,12 @@ class NumbersTest(unittest.TestCase):
         self.assertIsNone(consistency.compare(rows, later, 6.0, np.eye(3)))
 
 
-class BagTest(unittest.TestCase):
-    folder: tempfile.TemporaryDirectory[str]
+class BagTest(ScriptCase):
+    SCRIPT = "consistency"
 
     @classmethod
     def setUpClass(cls) -> None:
-        cls.folder = tempfile.TemporaryDirectory()
+        super().setUpClass()
         simulated_bag.write(cls.path("drive.bag"), duration=40.0)
         simulated_bag.write(cls.path("short.bag"), duration=3.0)
         stamps = np.array([stamp for topic, _, stamp in simulated_bag.messages(40.0) if topic == "/scan"])
@@ -118,26 +115,8 @@ class BagTest(unittest.TestCase):
             "method: dead_reckoning\nodometry_translation_per_meter: 0.001\nodometry_translation_per_radian: 0.001\n"
             "odometry_yaw_per_meter: 0.001\nodometry_yaw_per_radian: 0.001\n", encoding="utf-8")
 
-    @classmethod
-    def tearDownClass(cls) -> None:
-        cls.folder.cleanup()
-
-    @classmethod
-    def path(cls, name: str) -> str:
-        return str(Path(cls.folder.name) / name)
-
-    def run_script(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        path = f"{BIN.parents[1]}:{os.environ.get('CMAKE_PREFIX_PATH', '')}"
-        return subprocess.run([str(SCRIPT), *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                              check=False, env={**os.environ, "CMAKE_PREFIX_PATH": path})
-
-    def told(self, *arguments: str) -> str:
-        done = self.run_script(self.path("drive.bag"), *arguments)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        return done.stdout
-
     def windows(self, *arguments: str) -> Tuple[int, float, np.ndarray]:
-        said = self.told("--reference", self.path("true.tum"), "--reference-std", "0", "0", "--length", "4", "--windows",
+        said = self.said(self.path("drive.bag"), "--reference", self.path("true.tum"), "--reference-std", "0", "0", "--length", "4", "--windows",
                          "6", *arguments)
         found = re.search(r"(\d+) windows of 4 m .* median (\S+) \(2.37\)\n.*: x (\S+), y (\S+), yaw (\S+) ", said)
         assert found is not None, said
@@ -155,7 +134,7 @@ class BagTest(unittest.TestCase):
         self.assertLess(inside.min(), 0.5)
 
     def test_innovations_alone_need_no_reference(self) -> None:
-        said = self.told()
+        said = self.said(self.path("drive.bag"))
         rows = re.findall(r"^  (x|y|yaw) +mean square (\S+); +(.*)$", said, re.MULTILINE)
         self.assertEqual([axis for axis, _, _ in rows], ["x", "y", "yaw"], said)
         for _, mean_square, lags in rows:
@@ -164,12 +143,6 @@ class BagTest(unittest.TestCase):
             self.assertEqual(len(values), 5, said)
             self.assertTrue(all(abs(value) <= 1.0 for value in values), said)
         self.assertNotIn("windows", said)
-
-    def refused(self, *arguments: str) -> str:
-        done = self.run_script(*arguments)
-        self.assertIn(done.returncode, (1, 2), done.stdout)
-        self.assertRegex(done.stderr, r"(?m)^consistency: ")
-        return done.stderr
 
     def test_wrong_input(self) -> None:
         drive, true = self.path("drive.bag"), self.path("true.tum")

@@ -6,11 +6,8 @@ SCKF_BIN_DIR is the folder of the programs under test.
 from __future__ import annotations
 
 import math
-import os
 import re
-import subprocess
 import sys
-import tempfile
 import unittest
 from pathlib import Path
 from typing import List
@@ -21,22 +18,22 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "test" / "ros"), str(ROOT / "scripts")]
 import simulated_bag  # noqa: E402
+from script_case import ScriptCase  # noqa: E402
 from trajectory import Trajectory, write_tum  # noqa: E402
 
-BIN = Path(os.environ.get("SCKF_BIN_DIR", ROOT / "build" / "devel" / "lib" / "sckf_odometry"))
 DURATION = 12.0
 WRONG = 20  # the scan where the reference lies,
 BY = 0.4  # [m] by so much
 
 
-class PairsTest(unittest.TestCase):
-    folder: tempfile.TemporaryDirectory[str]
+class PairsTest(ScriptCase):
+    SCRIPT = "pairs"
     stamps: np.ndarray
 
     @classmethod
     def setUpClass(cls) -> None:
-        cls.folder = tempfile.TemporaryDirectory()
-        simulated_bag.write(str(cls.path("drive.bag")), duration=DURATION)
+        super().setUpClass()
+        simulated_bag.write(cls.path("drive.bag"), duration=DURATION)
         cls.stamps = np.array([stamp for topic, _, stamp in simulated_bag.messages(DURATION) if topic == "/scan"])
         poses = simulated_bag.true_trajectory(cls.stamps)
         write_tum(cls.path("true.tum"), Trajectory(cls.stamps, poses))
@@ -44,30 +41,8 @@ class PairsTest(unittest.TestCase):
         poses[WRONG, 0] += BY
         write_tum(cls.path("wrong.tum"), Trajectory(cls.stamps, poses))
 
-    @classmethod
-    def tearDownClass(cls) -> None:
-        cls.folder.cleanup()
-
-    @classmethod
-    def path(cls, name: str) -> Path:
-        return Path(cls.folder.name) / name
-
-    def run_pairs(self, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
-        path = f"{BIN.parents[1]}:{os.environ.get('CMAKE_PREFIX_PATH', '')}"
-        return subprocess.run([str(ROOT / "scripts" / "pairs"), *map(str, arguments)], stdout=subprocess.PIPE,
-                              stderr=subprocess.PIPE, text=True, check=False,
-                              env={**os.environ, "CMAKE_PREFIX_PATH": path})
-
-    def pairs(self, *arguments: str | Path) -> List[str]:
-        done = self.run_pairs(self.path("drive.bag"), *arguments)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        return done.stdout.splitlines()
-
-    def refused(self, *arguments: str | Path) -> str:
-        done = self.run_pairs(*arguments)
-        self.assertIn(done.returncode, (1, 2), done.stderr)
-        self.assertRegex(done.stderr, r"(?m)^pairs: ")
-        return done.stderr
+    def pairs(self, *arguments: str) -> List[str]:
+        return self.said(self.path("drive.bag"), *arguments).splitlines()
 
     def test_the_scan_where_the_reference_lies_comes_first(self) -> None:
         lines = self.pairs("--reference", self.path("wrong.tum"), "--count", "3")
@@ -96,8 +71,8 @@ class PairsTest(unittest.TestCase):
         self.assertEqual(nis, sorted(nis, reverse=True))
 
     def test_each_is_drawn(self) -> None:
-        folder = self.path("pictures")
-        self.pairs("--reference", self.path("wrong.tum"), "--count", "2", "--output", folder)
+        folder = Path(self.path("pictures"))
+        self.pairs("--reference", self.path("wrong.tum"), "--count", "2", "--output", str(folder))
         self.assertEqual(sorted(file.name for file in folder.iterdir()), ["01.png", "02.png"])
         picture = matplotlib.image.imread(folder / "01.png")[..., :3]
         third = picture.shape[1] // 3
@@ -114,7 +89,7 @@ class PairsTest(unittest.TestCase):
         self.assertIn("--count 0", self.refused(self.path("drive.bag"), "--count", "0"))
         self.assertIn("none.bag", self.refused(self.path("none.bag")))
         elsewhere = self.path("elsewhere.tum")
-        elsewhere.write_text("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n", encoding="utf-8")
+        Path(elsewhere).write_text("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n", encoding="utf-8")
         self.assertIn("no pose at the stamps", self.refused(self.path("drive.bag"), "--reference", elsewhere))
 
 
