@@ -124,15 +124,16 @@ MatrixDD seenCovariance(const LossDerivatives& loss, const ObservableDirections&
 }
 
 /// R_n: what is seen beyond what range noise explains. A variance is seen in so many samples to √(2/blocks); only what
-/// exceeds both is matching noise.
-MatrixDD matchingNoise(const MatrixDD& range_covariance, const MatrixDD& seen_covariance, std::size_t blocks) {
+/// exceeds it by twice that is matching noise, and times inflation: what all blocks have in common no block shows.
+MatrixDD matchingNoise(const MatrixDD& range_covariance, const MatrixDD& seen_covariance, std::size_t blocks,
+                       double inflation) {
   const Eigen::LLT<MatrixDD> range(range_covariance);
   const MatrixDD L = range.matrixL();
   MatrixDD whitened = range.matrixL().solve(seen_covariance);
   whitened = range.matrixL().solve(whitened.transpose()).eval();
   const Eigen::SelfAdjointEigenSolver<MatrixDD> eigen(symmetric(whitened));
-  const double explained = 1.0 + std::sqrt(2.0 / static_cast<double>(blocks));
-  const Eigen::VectorXd excess = (eigen.eigenvalues().array() - explained).max(0.0);
+  const double explained = 1.0 + 2.0 * std::sqrt(2.0 / static_cast<double>(blocks));
+  const Eigen::VectorXd excess = inflation * (eigen.eigenvalues().array() - explained).max(0.0);
   const MatrixDD half = L * eigen.eigenvectors();
   return half * excess.asDiagonal() * half.transpose();
 }
@@ -157,7 +158,8 @@ std::optional<DisplacementEstimate> estimateDisplacement(const AlignmentProblem&
   z.variance_reference = problem.reference().rangeVariances();
   z.variance_current = problem.current().rangeVariances();
   z.matching_noise = MatrixDD::Zero(seen.dimension(), seen.dimension());
-  z.matching_noise = matchingNoise(z.covariance(), seenCovariance(loss, seen, hessian), loss.blocks.size());
+  z.matching_noise = matchingNoise(z.covariance(), seenCovariance(loss, seen, hessian), loss.blocks.size(),
+                                   options.matching_inflation);
   estimate.residual_rms = std::sqrt(loss.loss_square / loss.loss_weight);
   return estimate;
 }

@@ -220,6 +220,7 @@ List matcherParameters(MatcherOptions& matcher) {
       number("observable_max_std", estimation.observability.max_std, aboveUpTo(0.0, 100.0), "m"),
       number("observable_min_information_ratio", estimation.observability.min_information_ratio, within(0.0, 1e6)),
       number("correlated_beams", estimation.correlated_beams, within(1, 10000), "beams"),
+      number("matching_inflation", estimation.matching_inflation, within(0.0, 1000.0)),
   };
 }
 

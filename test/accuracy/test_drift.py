@@ -1,14 +1,11 @@
 #!/usr/bin/python3
 """Whole logs through replay, one configuration for all: how far the estimate drifts, beside what is allowed.
 
-Always the two logs that come with MRPT; and the recorded ones in the folder that the environment variable SCKF_DATA names,
-NAME.bag with its reference trajectory NAME.tum. SCKF_BIN_DIR is the folder of the programs under test. At the end a table
-says what was measured, beside the bounds and beside the wheels alone: run with -s (pytest) or as it is to see it.
+At the end a table says what was measured, beside the bounds and beside the wheels alone: run with -s (pytest) or as it is
+to see it.
 """
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 import tempfile
 import unittest
@@ -20,15 +17,12 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "scripts"))
+from logs import MALAGA, installed, recorded, run, simulated  # noqa: E402
 from recording import halved, read_recording  # noqa: E402
 from revisit import closure, find_revisits  # noqa: E402
 from trajectory import Trajectory, drift, read_tum, sample  # noqa: E402
 from worse_wheels import Told, freezing, slipping, worsen  # noqa: E402
 
-BIN_DIR = Path(os.environ.get("SCKF_BIN_DIR", ROOT / "build" / "devel" / "lib" / "sckf_odometry"))
-DATASETS = Path("/usr/share/mrpt/datasets")
-SIMULATED = DATASETS / "graphslam-engine-demos" / "action_observations_map"
-MALAGA = DATASETS / "2006-01ENE-21-SENA_Telecom Faculty_one_loop_only.rawlog"
 COVERAGE = 0.98  # share of the reference's poses that the estimate must cover: scans that are left out show no drift
 
 
@@ -46,31 +40,6 @@ class Row:
     wheels: Figures
     measured: Figures
     bound: Figures
-
-
-def run(program: str, *arguments: str | Path) -> None:
-    done = subprocess.run([str(BIN_DIR / program), *map(str, arguments)], stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT, text=True, check=False)
-    if done.returncode != 0:
-        raise RuntimeError(f"{program} ended with {done.returncode}: {done.stdout}")
-
-
-def recorded(name: str) -> Path:
-    """The log's bag; skips the test where it is not at hand."""
-    folder = os.environ.get("SCKF_DATA")
-    if not folder:
-        raise unittest.SkipTest("SCKF_DATA does not name the folder of the recorded logs")
-    bag = Path(folder) / f"{name}.bag"
-    for file in (bag, bag.with_suffix(".tum")):
-        if not file.is_file():
-            raise unittest.SkipTest(f"{file} is missing")
-    return bag
-
-
-def installed(path: Path) -> Path:
-    if not path.is_file():
-        raise unittest.SkipTest(f"{path} is missing: it comes with Debian's mrpt-common")
-    return path
 
 
 class DriftTest(unittest.TestCase):
@@ -163,10 +132,7 @@ class DriftTest(unittest.TestCase):
         self.check_worse("freiburg-079", freezing, 1.3, 0.15)
 
     def test_simulated_log_of_mrpt(self) -> None:
-        bag, tum = self.path("simulated.bag"), self.path("simulated.tum")
-        run("rawlog_to_bag", installed(SIMULATED / "simul.rawlog"), bag, "--ground-truth",
-            installed(SIMULATED / "simul.rawlog.GT.txt"), "--tum", tum)
-        self.check_drift("simulated", bag, tum, 0.6, 0.018)
+        self.check_drift("simulated", *simulated(Path(self.folder.name)), 0.6, 0.018)
 
     def test_malaga_closes_on_its_second_pass(self) -> None:
         """No truth here, but the robot runs over its own way again: its scans fall on those of the first pass."""

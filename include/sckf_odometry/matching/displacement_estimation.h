@@ -11,7 +11,8 @@ namespace sckf {
 
 struct EstimationOptions {
   ObservabilityOptions observability;
-  int correlated_beams = 15;  ///< residuals of this many neighbouring beams may err together
+  int correlated_beams = 15;        ///< residuals of this many neighbouring beams may err together
+  double matching_inflation = 3.0;  ///< of what residuals show beyond range noise: they do not show all of it
 };
 
 struct DisplacementEstimate {

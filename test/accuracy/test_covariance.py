@@ -1,0 +1,89 @@
+#!/usr/bin/python3
+"""Whether the covariance can be believed on whole logs, one configuration for all: what the scripts pairs and consistency
+find, beside what is allowed. Run with -s (pytest) or as it is to see the figures.
+"""
+from __future__ import annotations
+
+import re
+import sys
+import unittest
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Tuple
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "test" / "tools")]
+from logs import recorded, simulated  # noqa: E402
+from script_case import ScriptCase  # noqa: E402
+
+EXACT = ("--reference-std", "0", "0")  # of a simulation
+
+
+@dataclass(frozen=True)
+class Found:
+    """The median NEES of displacements, or of the last poses of windows, and the share that is inside of a bound."""
+    nees: float
+    inside: float
+
+
+class OnLogs(ScriptCase):
+    """Of each log the most that the median may be, and the least that must be inside."""
+    PATTERN: str
+
+    def check(self, log: str, bag: Path, tum: Path, bound: Found, *options: str) -> None:
+        said = self.said(str(bag), "--reference", str(tum), *options)
+        numbers = re.search(self.PATTERN, said, re.DOTALL)
+        assert numbers is not None, said
+        nees, *shares = map(float, numbers.groups())
+        print(f"\n{log}, {self.SCRIPT}: median NEES {nees:.2f} (at most {bound.nees}, 2.37 is right), inside "
+              f"{min(shares):.3f} (at least {bound.inside})")
+        self.assertLessEqual(nees, bound.nees, said)
+        self.assertGreaterEqual(min(shares), bound.inside, said)
+
+    def check_recorded(self, log: str, bound: Found) -> None:
+        bag = recorded(log)
+        self.check(log, bag, bag.with_suffix(".tum"), bound)
+
+    def check_simulated(self, bound: Found) -> None:
+        bag, tum = simulated(Path(self.folder.name))
+        self.check("simulated", bag, tum, bound, *EXACT)
+
+
+class DisplacementsTest(OnLogs):
+    """Inside: below the 99 % bound of chi squared."""
+    SCRIPT = "pairs"
+    PATTERN = r"NEES, with the reference's own error: median (\S+) .* (\S+) below 11.34"
+
+    def test_intel(self) -> None:
+        self.check_recorded("intel", Found(2.8, 0.89))
+
+    def test_aces(self) -> None:
+        self.check_recorded("aces", Found(2.2, 0.94))
+
+    def test_freiburg_079(self) -> None:
+        self.check_recorded("freiburg-079", Found(3.9, 0.79))
+
+    def test_simulated_log_of_mrpt(self) -> None:
+        self.check_simulated(Found(2.2, 0.94))
+
+
+class WindowsTest(OnLogs):
+    """20 m from a pose that is known. Inside: of three sigma, in the worst of x, y and yaw."""
+    SCRIPT = "consistency"
+    PATTERN = r"NEES at their ends, median (\S+) .*inside 3 sigma: x (\S+), y (\S+), yaw (\S+) "
+
+    def test_intel(self) -> None:
+        self.check_recorded("intel", Found(4.0, 0.92))
+
+    def test_aces(self) -> None:
+        self.check_recorded("aces", Found(4.0, 0.96))
+
+    def test_freiburg_079(self) -> None:
+        self.check_recorded("freiburg-079", Found(9.0, 0.81))
+
+    def test_simulated_log_of_mrpt(self) -> None:
+        self.check_simulated(Found(6.5, 0.94))
+
+
+if __name__ == "__main__":
+    unittest.main()
