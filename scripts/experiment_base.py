@@ -1,11 +1,7 @@
-"""What the experiments have in common: the programs they run, tables, pictures, and what is told of them."""
+"""What the experiments have in common: what is asked for, tables, pictures, and what is told of them."""
 from __future__ import annotations
 
 import json
-import os
-import shlex
-import subprocess
-import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Dict, List, Optional, Sequence
@@ -16,7 +12,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 
-PACKAGE = "sckf_odometry"
+from programs import run_program  # noqa: E402
+
 WITH, WITHOUT, TRUTH, GREY, GREEN = "#1f6fb4", "#e4572e", "black", "#7a8fa6", "#3a8f5c"
 COLOURS = {"sckf": WITH, "sckf_nc": WITHOUT, "pseudo_absolute": GREEN, "dead_reckoning": GREY,
            "displacement_only": WITH, "displacement_only_nc": WITHOUT}
@@ -25,7 +22,7 @@ NAMES = {"sckf": "SC-KF", "sckf_nc": "SC-KF-NC", "pseudo_absolute": "pseudo-abso
 
 
 class ExperimentError(Exception):
-    """What is wrong, for a person to read."""
+    """Why an experiment cannot be, for a person to read."""
 
 
 @dataclass
@@ -61,27 +58,9 @@ class Result:
         (output / f"{self.name}.json").write_text(json.dumps(self.numbers, indent=2) + "\n")
 
 
-def find_program(name: str, bin_dir: Optional[Path]) -> Path:
-    """Beside this script where it is installed, or in the workspace that has been sourced."""
-    folders = [bin_dir] if bin_dir else [Path(sys.argv[0]).resolve().parent, Path(__file__).resolve().parent]
-    if not bin_dir:
-        prefixes = os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep)
-        folders += [Path(prefix) / "lib" / PACKAGE for prefix in prefixes if prefix]
-    folders = list(dict.fromkeys(folders))
-    for folder in folders:
-        if os.access(folder / name, os.X_OK):
-            return folder / name
-    remedy = "is that what --bin-dir should be?" if bin_dir else "build the package and source its setup.bash"
-    raise ExperimentError(f"{name} is not in {', '.join(map(str, folders))}: {remedy}")
-
-
 def run(setting: Setting, name: str, arguments: Sequence[object]) -> str:
     """Runs a program of the package; returns what it prints."""
-    command = [str(find_program(name, setting.bin_dir)), *map(str, arguments)]
-    done = subprocess.run(command, stdout=subprocess.PIPE, universal_newlines=True, check=False)
-    if done.returncode != 0:
-        raise ExperimentError(f"{' '.join(map(shlex.quote, command))}: ended with {done.returncode}")
-    return done.stdout
+    return run_program(name, arguments, setting.bin_dir)
 
 
 def simulate(setting: Setting, name: str) -> None:

@@ -9,7 +9,7 @@ from typing import Dict, List, Sequence
 
 import numpy as np
 
-from experiment_base import Setting, run
+from programs import run_program
 from recording import Topics
 
 AXES = ("x", "y", "yaw")
@@ -42,7 +42,7 @@ def scan_table(log: argparse.Namespace, options: Sequence[object] = ()) -> List[
     with tempfile.TemporaryDirectory() as folder:
         table = Path(folder) / "scans.csv"
         arguments = [log.bag, "--csv", table, "--scan-topic", log.scan_topic, "--odom-topic", log.odom_topic, *options]
-        run(Setting(Path(folder)), "replay", arguments + (["--params", log.params] if log.params else []))
+        run_program("replay", arguments + (["--params", log.params] if log.params else []))
         with open(table, newline="", encoding="utf-8") as file:
             return list(csv.DictReader(file))
 

@@ -20,9 +20,9 @@ import numpy as np
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 sys.path.insert(0, str(SCRIPTS))
-from experiment_base import ExperimentError, find_program  # noqa: E402
 from experiment_landmarks import rms_after_alignment  # noqa: E402
 from experiment_logs import Estimates, end_error, mean_nees  # noqa: E402
+from programs import ProgramError, find_program  # noqa: E402
 from revisit import Revisit  # noqa: E402
 from trajectory import Trajectory  # noqa: E402
 
@@ -256,7 +256,7 @@ class CommandLine(unittest.TestCase):
         np.testing.assert_allclose(variances[1], 4.0 * variances[0], rtol=1e-6)
 
     def test_says_where_it_looked_for_a_program(self) -> None:
-        with self.assertRaisesRegex(ExperimentError, "/no/such/folder.*--bin-dir"):
+        with self.assertRaisesRegex(ProgramError, "/no/such/folder.*--bin-dir"):
             find_program("replay", Path("/no/such/folder"))
 
 
