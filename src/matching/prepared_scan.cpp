@@ -88,12 +88,13 @@ void undo(const ScanMotion& motion, double time_increment, ScannedPoints& points
 }
 
 ScannedPoints readings(const LaserScan& scan, const Eigen::Isometry3d& base_from_laser, double range_min,
-                       double range_max) {
+                       double range_max, double offset) {
   const Eigen::Vector2d origin = base_from_laser.translation().head<2>();
   ScannedPoints points;
   for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
-    const auto range = static_cast<double>(scan.ranges[i]);
-    const bool read = std::isfinite(range) && range > 0.0 && range >= range_min && range < range_max;
+    const auto told = static_cast<double>(scan.ranges[i]);
+    const double range = told + offset;
+    const bool read = std::isfinite(told) && told > 0.0 && told >= range_min && told < range_max && range > 0.0;
     if (!read) continue;
     const double bearing = scan.angle_min + static_cast<double>(i) * scan.angle_increment;
     const Eigen::Vector3d ray = base_from_laser.linear() * Eigen::Vector3d(std::cos(bearing), std::sin(bearing), 0.0);
@@ -139,7 +140,7 @@ std::shared_ptr<const PreparedScan> prepareScan(const LaserScan& scan, const Eig
   prepared->beams = scan.ranges.size();
   const double range_min = std::max(options.range_min, scan.range_min);
   const double range_max = std::min(options.range_max, scan.range_max);
-  prepared->points = readings(scan, base_from_laser, range_min, range_max);
+  prepared->points = readings(scan, base_from_laser, range_min, range_max, options.range_offset);
   if (!motion.atRest()) undo(motion, scan.time_increment, prepared->points);
   if (prepared->size() < static_cast<std::size_t>(options.min_points)) {
     std::ostringstream reason;
@@ -148,6 +149,7 @@ std::shared_ptr<const PreparedScan> prepareScan(const LaserScan& scan, const Eig
     return reject(reason.str());
   }
   prepared->angle_increment = scan.angle_increment;
+  prepared->range_offset = options.range_offset;
   prepared->range_noise = estimateRangeNoise(prepared->points, scan.angle_increment, options);
   describe(*prepared, options.surface);
   return prepared;
@@ -160,6 +162,7 @@ std::shared_ptr<const PreparedScan> setAside(const PreparedScan& scan, const std
   rest->beams = scan.beams;
   rest->angle_increment = scan.angle_increment;
   rest->range_noise = scan.range_noise;
+  rest->range_offset = scan.range_offset;
   rest->set_aside = scan.set_aside;
   for (std::size_t i = 0; i < scan.size(); ++i) {
     if (aside[i]) {

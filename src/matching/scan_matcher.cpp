@@ -17,7 +17,7 @@ namespace {
 /// Where the search for the displacement has come to.
 struct Alignment {
   SE2 reference_from_current;
-  double cost = 0.0;      // of the points and of the prior: smaller is better
+  double cost = 0.0;      // of the points: smaller is better
   double surprise = 0.0;  // squared Mahalanobis distance from the prior
   AlignmentProblem problem;
 };
@@ -40,12 +40,12 @@ class Search {
     if (best && !suspicious(*best)) return best;
     if (options_.search_yaw_steps > 0) {
       std::optional<Alignment> other = align(bestOtherYaw());
-      if (other && (!best || other->cost < best->cost)) best.emplace(std::move(*other));
+      if (other && (!best || cost(*other) < cost(*best))) best.emplace(std::move(*other));
     }
     if (options_.wide_search.yaw > 0.0 && !(best && fits(*best))) {
       std::optional<Alignment> far = farAway();
       const double gain = kGain * static_cast<double>(current_.size());
-      if (far && (!best || pointsCost(*far) + gain < pointsCost(*best))) best.emplace(std::move(*far));
+      if (far && (!best || far->cost + gain < best->cost)) best.emplace(std::move(*far));
     }
     return best;
   }
@@ -123,7 +123,7 @@ class Search {
     if (tooFew(problem)) return std::nullopt;
     const Eigen::Vector3d e = error(x, mean_);
     const double surprise = e.dot(prior_information_ * e);
-    const double cost = problem.cost(x) + 0.5 * surprise;
+    const double cost = problem.cost(x);
     return Alignment{x, cost, surprise, std::move(problem)};
   }
 
@@ -143,11 +143,15 @@ class Search {
     return problem.pairs().size() < static_cast<std::size_t>(options_.min_pairs);
   }
 
-  double pointsCost(const Alignment& alignment) const { return alignment.cost - 0.5 * alignment.surprise; }
+  /// Of the points and of the prior, to compare alignments with. Neighbouring points err alike, as on a wall that looks
+  /// rough, so that a few tell as much as one: the prior counts so many times.
+  static double cost(const Alignment& alignment) {
+    constexpr double kAlike = 4.0;
+    return alignment.cost + kAlike * 0.5 * alignment.surprise;
+  }
 
   bool fits(const Alignment& alignment) const {
-    return alignment.problem.overlap() >= options_.wide_search_below_overlap && alignment.problem.scale() <= kRough &&
-           alignment.surprise <= kSurprise;
+    return alignment.problem.overlap() >= options_.wide_search_below_overlap && alignment.surprise <= kSurprise;
   }
 
   bool suspicious(const Alignment& alignment) const {
@@ -179,6 +183,7 @@ Match concluded(const std::optional<Alignment>& aligned, const MatcherOptions& o
   match.pairs = aligned->problem.pairs();
   match.overlap = aligned->problem.overlap();
   match.residual_rms = estimate ? estimate->residual_rms : 0.0;
+  if (estimate) match.range_offset = estimate->range_offset;
   if (match.overlap < options.min_overlap) {
     match.failure = MatchFailure::kNoOverlap;
   } else if (!estimate) {

@@ -56,7 +56,8 @@ void checkPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance) {
 ScanOdometry::ScanOdometry(const PipelineOptions& options, const SE2& odom_from_base, const Eigen::Matrix3d& covariance)
     : options_(options),
       matcher_(options.matcher),
-      lasers_(options.lasers, {ReferencePolicy(options.reference), {}, std::nullopt}),
+      lasers_(options.lasers,
+              {ReferencePolicy(options.reference), RangeOffset(options.range_offset_std), {}, std::nullopt}),
       odometry_(options.motion, options.odometry_timeout),
       imu_(options.imu.timeout),
       twist_(options.twist_window),
@@ -151,8 +152,7 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   filter_->beginScan();
   useHeading(report);  // (34)
   report.wheels_known = std::exchange(wheels_known_, true);
-  report.scan =
-      prepareScan(waiting.scan, waiting.base_from_laser, options_.scan, &report.reason, motionDuring(waiting));
+  report.scan = prepared(waiting, report.reason);
   if (report.scan) claimLandmarks(report);
   if (!report.scan) {
     report.outcome = ScanOutcome::kUnusable;
@@ -173,6 +173,7 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   report.in_map = inMap();
   report.calibration = filter_->calibration();
   report.gyro_bias = filter_->gyroBias();
+  report.range_offset = laser.range_offset;
   report.gyro_time = std::exchange(gyro_time_, 0.0);
   report.stands = standstill_.stands(options_.standstill);
   leaveTrail();
@@ -180,6 +181,13 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   carryOn();
   report.total_time = stopwatch.seconds();
   return report;
+}
+
+std::shared_ptr<const PreparedScan> ScanOdometry::prepared(const WaitingScans::Entry& waiting,
+                                                           std::string& rejection) const {
+  ScanOptions options = options_.scan;
+  options.range_offset = lasers_[waiting.laser].range_offset.value();
+  return prepareScan(waiting.scan, waiting.base_from_laser, options, &rejection, motionDuring(waiting));
 }
 
 std::optional<Estimate> ScanOdometry::latest() const {
@@ -210,7 +218,10 @@ void ScanOdometry::setOptions(const PipelineOptions& options) {
   checkLandmarks(options);
   options_ = options;
   matcher_ = ScanMatcher(options.matcher);
-  for (Laser& laser : lasers_) laser.policy.setOptions(options.reference);
+  for (Laser& laser : lasers_) {
+    laser.policy.setOptions(options.reference);
+    laser.range_offset.setStd(options.range_offset_std);
+  }
   landmarks_.setOptions(options.landmarks);
   odometry_.setLimits(options.motion, options.odometry_timeout);
   twist_.setDuration(options.twist_window);
@@ -236,6 +247,7 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
   references_.clear();
   for (Laser& laser : lasers_) {
     laser.policy = ReferencePolicy(options_.reference);
+    laser.range_offset = RangeOffset(options_.range_offset_std);
     laser.taken.reset();
   }
   landmarks_ = Landmarks(options_.landmarks);

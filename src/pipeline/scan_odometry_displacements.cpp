@@ -26,7 +26,10 @@ void ScanOdometry::compareWithReference(std::size_t clone, ScanReport& report) {
   const Stopwatch stopwatch;
   report.match = matcher_.match(reference, *report.scan, report.prediction);  // (1)
   report.match_time = stopwatch.seconds();
-  if (report.match.displacement) report.match.displacement->clone = clone;
+  if (report.match.displacement) {
+    report.match.displacement->clone = clone;
+    lasers_[report.laser].range_offset.add(report.match.range_offset, report.scan->range_offset);
+  }
   const bool used = report.match.displacement ? fuse(report) : false;  // (17)-(23)
   if (!report.match.displacement) {
     report.outcome = ScanOutcome::kNoMatch;

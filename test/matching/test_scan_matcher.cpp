@@ -367,6 +367,55 @@ TEST(MatchingNoise, IsWhatRangeNoiseDoesNotExplainTimesItsInflation) {
   EXPECT_LT(thrice.nees, seen.nees);
 }
 
+/// The mean of what matches tell, each by its information.
+RangeOffsetEvidence rangeOffsetTold(double offset, double noise) {
+  SimulatedLaser laser;
+  laser.noise = noise;
+  laser.offset = offset;
+  double information = 0.0;
+  double sum = 0.0;
+  double bias = 0.0;
+  for (int i = 0; i < 60; ++i) {
+    std::mt19937_64 random(static_cast<std::uint64_t>(i));
+    std::uniform_real_distribution<double> within(-1.0, 1.0);
+    const SE2 start(within(random), within(random), 3.0 * within(random));
+    const SE2 motion(0.5 * within(random), 0.1 * within(random), 0.4 * within(random));
+    const Match match = matchIn(room(), start, motion, laser, prediction(motion), &random);
+    EXPECT_TRUE(match.displacement) << toString(match.failure);
+    information += match.range_offset.information;
+    sum += match.range_offset.information * match.range_offset.value;
+    bias += match.range_offset.information * match.range_offset.bias_std;
+  }
+  EXPECT_GT(information, 0.0);
+  return {sum / information, information, bias / information};
+}
+
+TEST(RangeOffset, IsToldByHowScansFallTogether) {
+  for (const double noise : {0.005, 0.01, 0.02}) {
+    const RangeOffsetEvidence none = rangeOffsetTold(0.0, noise);
+    for (const double offset : {0.02, -0.02}) {
+      const RangeOffsetEvidence told = rangeOffsetTold(offset, noise);
+      EXPECT_NEAR(told.value - none.value, -offset, 0.2 * std::abs(offset)) << "range noise " << noise;
+    }
+  }
+}
+
+/// Their noise biases what matches tell, the more the larger it is.
+TEST(RangeOffset, WhatNoiseTellsOfItIsAllowedFor) {
+  for (const double noise : {0.01, 0.02}) {
+    const RangeOffsetEvidence none = rangeOffsetTold(0.0, noise);
+    EXPECT_NEAR(none.bias_std, 24.0 * noise * noise, 4.0 * noise * noise) << "of the noisier scan: 20 times its variance";
+    EXPECT_LT(std::abs(none.value), 3.0 * none.bias_std + 2.0 / std::sqrt(none.information)) << "noise " << noise;
+  }
+}
+
+TEST(RangeOffset, ScansThatDoNotSeeAllDirectionsTellNothingOfIt) {
+  const Match match = matchIn(corridor(), SE2(), SE2(0.4, 0.0, 0.05), frontLaser(), prediction(SE2(0.4, 0.0, 0.05)));
+  ASSERT_TRUE(match.displacement) << toString(match.failure);
+  ASSERT_EQ(match.displacement->dimension(), 2);
+  EXPECT_EQ(match.range_offset.information, 0.0);
+}
+
 TEST(BothWays, ErrLessThanOneAmongRoughWalls) {
   const World world = rough(room(), 0.03);
   SimulatedLaser laser;

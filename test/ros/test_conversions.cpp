@@ -266,6 +266,8 @@ TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
   report.landmarks.resize(7);
   report.calibration.error << 0.03, -0.02, 0.01, 0.07;
   report.calibration.covariance = Eigen::Vector4d(1e-4, 4e-4, 9e-4, 16e-4).asDiagonal();
+  report.range_offset = RangeOffset(0.02);
+  report.range_offset.add({0.01, 30.0 / 4e-4, 0.0}, 0.0);
   report.gyro_bias = {0.01, 4e-6};
   report.gyro_time = 0.1;
   report.heading = HeadingUse::kContradicts;
@@ -297,6 +299,8 @@ TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
   EXPECT_NEAR(status.calibration_rotation_per_meter_std, 0.03, 1e-12);
   EXPECT_EQ(status.calibration_laser_ahead, 0.07);
   EXPECT_NEAR(status.calibration_laser_ahead_std, 0.04, 1e-12);
+  EXPECT_NEAR(status.range_offset, 0.005, 1e-12);
+  EXPECT_NEAR(status.range_offset_std, std::sqrt(2e-4), 1e-12);
   EXPECT_EQ(status.gyro_bias, 0.01);
   EXPECT_NEAR(status.gyro_bias_std, 0.002, 1e-12);
   EXPECT_EQ(status.gyro_time, 0.1);

@@ -215,6 +215,18 @@ TEST_F(HealthTest, TheErrorsOfTheWheelsAreToldWhereTheyAreEstimated) {
   EXPECT_EQ(value("error of the wheels: laser ahead [m]"), "0.0700 +- 0.0400");
 }
 
+TEST_F(HealthTest, TheOffsetOfRangesIsToldWhereItIsEstimated) {
+  const std::string key = "range offset on /scan [m]";
+  verdictAt(100.5);
+  EXPECT_EQ(value(key), "missing");
+  ScanReport report = scan(ScanOutcome::kUpdated, 100.5);
+  report.range_offset = RangeOffset(0.02);
+  report.range_offset.add({0.01, 30.0 / 4e-4, 0.0}, 0.0);
+  health_.scanTaken(report);
+  verdictAt(100.6);
+  EXPECT_EQ(value(key), "0.0050 +- 0.0141");
+}
+
 TEST_F(HealthTest, AnImuThatIsSilentIsAWarningAndNoMore) {
   options_.pipeline.imu.gyro = true;
   health_.imu.came(at(100.0), at(100.0));

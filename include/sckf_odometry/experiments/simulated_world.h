@@ -64,7 +64,8 @@ struct SimulatedLaser {
   double angle_increment = 2.0 * M_PI / 361.0;
   double time_increment = 0.0;  ///< [s] from one beam to the next
   double range_max = 30.0;
-  double noise = 0.0;  ///< std of a range [m]
+  double noise = 0.0;   ///< std of a range [m]
+  double offset = 0.0;  ///< all ranges are too long by [m]
   Eigen::Isometry3d base_from_laser = Eigen::Isometry3d::Identity();
 };
 
@@ -107,7 +108,7 @@ inline LaserScan simulateSweep(const World& world, const std::function<SE2(doubl
     const Eigen::Vector2d origin = world_from_base * Eigen::Vector2d(laser.base_from_laser.translation().head<2>());
     const double range = castRay(world, origin, world_from_base.rotation() * ray.head<2>());
     const double noise = random != nullptr ? laser.noise * normal(*random) : 0.0;
-    scan.ranges.push_back(static_cast<float>(range + noise));
+    scan.ranges.push_back(static_cast<float>(range + laser.offset + noise));
   }
   return scan;
 }

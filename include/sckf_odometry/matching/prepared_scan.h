@@ -20,6 +20,7 @@ struct ScanOptions {
   double range_max = 80.0;        ///< [m] readings of this or above are ignored; the scan's own range_max holds too
   double range_noise_min = 0.01;  ///< [m] std of a range: no scan is believed to be better than this …
   double range_noise_max = 0.10;  ///< [m] … nor worse than this; in between, the scan itself tells
+  double range_offset = 0.0;      ///< [m] added to each reading
   int min_points = 20;            ///< a scan with fewer readings is not usable
   int max_beams = 2048;           ///< of a scan with more, every second beam is used, or every third, …
   SurfaceOptions surface;
@@ -31,6 +32,7 @@ struct PreparedScan {
   std::size_t beams = 0;                   ///< M: number of ranges used of the scan, read or not
   double angle_increment = 0.0;            ///< between neighbouring beams [rad]
   double range_noise = 0.0;                ///< std of one range, estimated from this scan [m]
+  double range_offset = 0.0;               ///< that has been added to each range [m]
   ScannedPoints points;                    ///< the readings
   std::vector<Surface> surface;            ///< the surface around each point
   mrpt::maps::CSimplePointsMap map;        ///< the same points, for CICP and for nearest neighbours

@@ -48,6 +48,7 @@ struct Match {
   MatchFailure failure = MatchFailure::kNone;
   std::vector<Pair> pairs;    ///< at the aligned pose
   double overlap = 0.0;       ///< share of the points of the current scan that have a partner, 0 to 1
+  RangeOffsetEvidence range_offset;
   double residual_rms = 0.0;  ///< of the weighted residuals: 1 where the noise explains them
 };
 

@@ -16,6 +16,7 @@
 #include "sckf_odometry/pipeline/odometry_buffer.h"
 #include "sckf_odometry/pipeline/other_sensors.h"
 #include "sckf_odometry/pipeline/pose_updates.h"
+#include "sckf_odometry/pipeline/range_offset.h"
 #include "sckf_odometry/pipeline/reference_policy.h"
 #include "sckf_odometry/pipeline/reference_scans.h"
 #include "sckf_odometry/pipeline/scan_report.h"
@@ -31,7 +32,7 @@ struct GateOptions {
   double slip_std_translation = 0.3;  ///< [m] what the wheels may have been wrong by in such an interval …
   double slip_std_yaw = 0.3;          ///< [rad] … and in yaw
   double slip_min_overlap = 0.3;      ///< scans match well if at least this share of the points has a partner …
-  double slip_max_residual = 2.0;     ///< … and the weighted residuals are at most this
+  double slip_max_residual = 3.0;     ///< … and the weighted residuals are at most this
 };
 
 struct PipelineOptions {
@@ -43,6 +44,7 @@ struct PipelineOptions {
   PoseUpdateOptions pose_updates;
   bool prefer_twist_covariance = false;  ///< use the twist covariance of the odometry message where it is sensible
   ScanOptions scan;
+  double range_offset_std = 0.015;  ///< [m] how wrong all ranges of a laser may be together: estimated; 0: not at all
   bool deskew = false;  ///< undo the motion while a scan is taken; it waits for odometry at its last beam then
   MatcherOptions matcher;
   ReferenceOptions reference;
@@ -118,6 +120,7 @@ class ScanOdometry {
  private:
   void begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp);
   ScanReport take(const WaitingScans::Entry& waiting);
+  std::shared_ptr<const PreparedScan> prepared(const WaitingScans::Entry& waiting, std::string& rejection) const;
   void compareWithReference(std::size_t clone, ScanReport& report);
   bool fuse(ScanReport& report);
   void followSlip(const Displacement& displacement);
@@ -156,6 +159,7 @@ class ScanOdometry {
   ScanMatcher matcher_;
   struct Laser {
     ReferencePolicy policy;
+    RangeOffset range_offset;
     SweepCheck sweeps;
     std::optional<Stamp> taken;  ///< of the last scan of this estimate
   };

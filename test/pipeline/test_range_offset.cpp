@@ -1,0 +1,122 @@
+// What all ranges of a laser are wrong by together: the filter for it by hand values, and on drives with such a laser.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "pipeline/simulated_drive.h"
+#include "sckf_odometry/pipeline/range_offset.h"
+
+namespace sckf::test {
+namespace {
+
+/// Thirty matches count as one.
+RangeOffsetEvidence told(double value, double std, double bias_std = 0.0) {
+  return {value, 30.0 / (std * std), bias_std};
+}
+
+TEST(RangeOffset, IsTheMeanOfNoneAndOfWhatIsToldByTheirVariances) {
+  RangeOffset offset(0.02);
+  EXPECT_EQ(offset.value(), 0.0);
+  EXPECT_NEAR(offset.variance(), 4e-4, 1e-18);
+  offset.add(told(0.03, 0.02), 0.0);
+  EXPECT_NEAR(offset.value(), 0.015, 1e-15);
+  EXPECT_NEAR(offset.variance(), 2e-4, 1e-18);
+  offset.add(told(0.02, 0.02), 0.015);  // what is left beside what is added already: 0.035 in all
+  EXPECT_NEAR(offset.value(), 0.0325 * 2.0 / 3.0, 1e-15);
+  EXPECT_NEAR(offset.variance(), 4e-4 / 3.0, 1e-18);
+}
+
+TEST(RangeOffset, ABiasIsNotAveragedByManyMatches) {
+  RangeOffset offset(0.02);
+  for (int i = 0; i < 100000; ++i) offset.add(told(0.03 - offset.value(), 0.02, 0.02), offset.value());
+  EXPECT_NEAR(offset.value(), 0.015, 1e-6);
+  EXPECT_NEAR(offset.variance(), 2e-4, 1e-8);
+}
+
+TEST(RangeOffset, NoSingleMatchMovesItFarAndWhatTellsNothingDoesNotAtAll) {
+  RangeOffset offset(0.03);
+  offset.add(told(-10.0, 0.04), 0.0);
+  EXPECT_NEAR(offset.value(), -3.0 * 0.05 * 0.36, 1e-15);  // three std, times the share of what is told
+  const double before = offset.value();
+  offset.add({0.02, 0.0, 0.0}, before);
+  offset.add({0.02, std::numeric_limits<double>::quiet_NaN(), 0.0}, before);
+  EXPECT_EQ(offset.value(), before);
+}
+
+TEST(RangeOffset, WithoutStdThereIsNoneAndAnotherStdBeginsAnew) {
+  RangeOffset offset(0.0);
+  offset.add(told(0.03, 0.001), 0.0);
+  EXPECT_EQ(offset.value(), 0.0);
+  EXPECT_EQ(offset.variance(), 0.0);
+  offset.setStd(0.02);
+  offset.add(told(0.03, 0.02), 0.0);
+  offset.setStd(0.02);
+  EXPECT_NEAR(offset.value(), 0.015, 1e-15);
+  offset.setStd(0.01);
+  EXPECT_EQ(offset.value(), 0.0);
+}
+
+PipelineOptions estimating(double std) {
+  PipelineOptions options;
+  options.range_offset_std = std;
+  return options;
+}
+
+TEST(RangeOffset, IsFoundOnADrive) {
+  for (const double error : {0.03, 0.0, -0.03}) {
+    SimulatedDrive drive;
+    drive.laser.offset = error;
+    Driven driven(drive, estimating(0.03));
+    driven.run(0, 15000);
+    const RangeOffset& found = driven.reports.back().range_offset;
+    EXPECT_NEAR(found.value(), -error, 3.0 * std::sqrt(found.variance())) << "of " << error;
+    EXPECT_NEAR(found.value(), -error, 0.01) << "of " << error;
+    EXPECT_LT(std::sqrt(found.variance()), 0.01);
+  }
+}
+
+/// Along a corridor with a straight wall to the right and pillars to the left: without an estimate each match turns the
+/// robot to the same side.
+TEST(RangeOffset, ItsEstimateKeepsARobotInACorridorStraight) {
+  World hall = {{{-5.0, -0.8}, {40.0, -0.8}}, {{-5.0, 2.5}, {-5.0, -0.8}}, {{40.0, -0.8}, {40.0, 2.5}}};
+  for (double x = -4.0; x < 40.0; x += 3.0) {
+    const World pillar = closedPolygon({{x, 2.0}, {x + 0.8, 2.0}, {x + 0.8, 2.5}, {x, 2.5}});
+    hall.insert(hall.end(), pillar.begin(), pillar.end());
+  }
+  const auto yawAfter = [&](double std) {
+    SimulatedDrive drive({}, 61000, hall, [](double t) { return SE2(0.5 * t, 0.0, 0.0); });
+    drive.laser = frontLaser();
+    drive.laser.noise = 0.005;
+    drive.laser.offset = -0.03;
+    Driven driven(drive, estimating(std));
+    driven.run(0, 60000);
+    return std::abs(driven.latestError(60000).z());
+  };
+  const double with = yawAfter(0.03);
+  const double without = yawAfter(0.0);
+  EXPECT_GT(without, 0.02) << "else there is nothing to be shown";
+  EXPECT_LT(with, 0.5 * without);
+}
+
+TEST(RangeOffset, EachLaserHasItsOwn) {
+  PipelineOptions options = estimating(0.03);
+  options.lasers = 2;
+  SimulatedDrive front;
+  front.laser.offset = 0.03;
+  SimulatedDrive rear;
+  rear.laser.offset = -0.03;
+  ScanOdometry pipeline(options);
+  RangeOffset found[] = {RangeOffset(0.0), RangeOffset(0.0)};
+  for (int ms = 1; ms <= 15000; ++ms) {
+    if (ms % 20 == 0) pipeline.addOdometry(front.odometry(ms));
+    if (ms % 100 == 7) pipeline.addScan(front.scan(ms), front.laser.base_from_laser, 0);
+    if (ms % 100 == 57) pipeline.addScan(rear.scan(ms), rear.laser.base_from_laser, 1);
+    for (const ScanReport& report : pipeline.process()) found[report.laser] = report.range_offset;
+  }
+  EXPECT_NEAR(found[0].value(), -0.03, 0.01);
+  EXPECT_NEAR(found[1].value(), 0.03, 0.01);
+}
+
+}  // namespace
+}  // namespace sckf::test
