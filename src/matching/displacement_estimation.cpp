@@ -158,6 +158,10 @@ RangeOffsetEvidence rangeOffset(const AlignmentProblem& problem, const LossDeriv
   // Of surfaces fitted across what is not straight, as far as noise lets them: by simulation 1 to 4 mm for 1 cm of noise,
   // which turn a displacement by next to nothing.
   constexpr double kBias = 20.0;  // [1/m]
+  // Less than this, a residual's derivative by the offset (1: of a wall seen from one side, then from the other) is not
+  // of the motion but of noise in directions of surfaces. That is the residuals' own noise, so it would tell of an offset
+  // in every pair of scans that are near each other: 8 cm, after a while of scans that are compared with the last one.
+  constexpr double kDerivativeNoise = 0.03;
   if (seen.dimension() < 3) return {};
   const Eigen::Vector3d coupling = loss.with_offset.topRightCorner<3, 1>();
   const Eigen::Vector3d eliminated = loss.with_offset.topLeftCorner<3, 3>().ldlt().solve(coupling);
@@ -166,6 +170,8 @@ RangeOffsetEvidence rangeOffset(const AlignmentProblem& problem, const LossDeriv
   const double value = -gradient / information;
   if (!(information > 0.0) || !std::isfinite(value)) return {};
   const double noise = std::max(problem.reference().range_noise, problem.current().range_noise);
+  const double derivative = noise * std::sqrt(information / loss.loss_weight);  // rms, the displacement eliminated
+  if (derivative < kDerivativeNoise) return {};
   return {value, information / std::max(1.0, loss.loss_square / loss.loss_weight), kBias * noise * noise};
 }
 

@@ -8,6 +8,7 @@ import unittest
 import numpy as np
 import rospy
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from sckf_odometry.msg import Status
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -23,11 +24,11 @@ def points(cloud):
     return np.frombuffer(cloud.data, np.float32).reshape(cloud.width * cloud.height, -1)[:, :2]
 
 
-def placed(scan, pose):
-    """The points of a scan, n x 2, with base_link at a pose."""
+def placed(scan, pose, range_offset):
+    """The points of a scan, n x 2, with base_link at a pose, and with what was known of its ranges' offset then."""
     angles = scan.angle_min + np.arange(len(scan.ranges)) * scan.angle_increment
     laser = simulated_bag.compose(pose, np.array([MOUNT.x, 0.0, 0.0]))
-    ranges = np.array(scan.ranges)[:, None]
+    ranges = np.array(scan.ranges)[:, None] + range_offset
     return laser[:2] + ranges * np.stack([np.cos(laser[2] + angles), np.sin(laser[2] + angles)], axis=1)
 
 
@@ -36,7 +37,7 @@ class DebugView(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         kinds = {'debug/reference_scan': PointCloud2, 'debug/aligned_scan': PointCloud2, 'debug/markers': MarkerArray,
-                 'pose': PoseWithCovarianceStamped}
+                 'pose': PoseWithCovarianceStamped, 'status': Status}
         received = {topic: {} for topic in kinds}
 
         def keep(message, topic):
@@ -52,9 +53,15 @@ class DebugView(unittest.TestCase):
         cls.first, cls.compared = min(cls.scans), sorted(cls.scans)[1:]
         cls.reference, cls.aligned, cls.markers = (received[topic] for topic in list(kinds)[:3])
         cls.poses = {stamp: helpers.planar(message.pose.pose) for stamp, message in received['pose'].items()}
+        stamps = sorted(cls.scans)
+        cls.range_offsets = {stamps[0]: 0.0}  # of each scan: what those before it told
+        cls.range_offsets.update({now: received['status'][last].range_offset for last, now in zip(stamps, stamps[1:])})
 
     def marker(self, stamp, name):
         return next(marker for marker in self.markers[stamp].markers if (marker.ns, marker.id) == (name, 0))
+
+    def placed_at_its_pose(self, stamp):
+        return placed(self.scans[stamp], self.poses[stamp], self.range_offsets[stamp])
 
     def ends_of_pairs(self, stamp):
         return np.array([(p.x, p.y) for p in self.marker(stamp, 'pairs').points])
@@ -73,14 +80,14 @@ class DebugView(unittest.TestCase):
 
     def test_the_aligned_scan_is_at_the_estimate(self):
         for stamp in self.compared:
-            np.testing.assert_allclose(points(self.aligned[stamp]), placed(self.scans[stamp], self.poses[stamp]), atol=1e-4)
+            np.testing.assert_allclose(points(self.aligned[stamp]), self.placed_at_its_pose(stamp), atol=1e-4)
 
     def test_the_reference_is_an_earlier_scan_where_it_was_taken_and_is_kept_for_several(self):
         used = set()
         for stamp in self.compared:
             cloud = points(self.reference[stamp])
             its_stamp = next((earlier for earlier in self.scans if earlier < stamp and np.allclose(
-                cloud, placed(self.scans[earlier], self.poses[earlier]), atol=1e-4)), None)
+                cloud, self.placed_at_its_pose(earlier), atol=1e-4)), None)
             self.assertIsNotNone(its_stamp, stamp)
             used.add(its_stamp)
         self.assertGreater(len(used), 1)
