@@ -30,14 +30,34 @@ void allowForSlip(const MotionMeasurement& z, const Innovation::Vector& r, const
   if (r.size() == 1 && r(0) * r(0) > kContradiction * S(0, 0)) Q += z.seen.transpose() * r * r.transpose() * z.seen;
 }
 
+/// A column of the identity for each element that is not zero.
+Eigen::Matrix4Xd columnsOf(const Eigen::Vector4d& v) {
+  Eigen::Matrix4Xd columns(4, (v.array() != 0.0).count());
+  Eigen::Index column = 0;
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    if (v(i) != 0.0) columns.col(column++) = Eigen::Vector4d::Unit(i);
+  }
+  return columns;
+}
+
+/// ∂u/∂(s, r, k, l)
+WheelCalibration::Jacobian byWheelCalibration(const SE2& u) {
+  WheelCalibration::Jacobian B = WheelCalibration::Jacobian::Zero();
+  B.topLeftCorner<2, 1>() = u.translation();
+  B.block<1, 2>(2, 1) << u.yaw, u.translation().norm();
+  B.topRightCorner<2, 1>() << std::cos(u.yaw) - 1.0, std::sin(u.yaw);
+  return B;
+}
+
 }  // namespace
 
 MultiCloneFilter::MultiCloneFilter(const SE2& odom_from_base, const Matrix3d& covariance, const StateOptions& states)
-    : options_(states), origin_(odom_from_base.translation()), pose_(0.0, 0.0, odom_from_base.yaw) {
+    : options_(states),
+      origin_(odom_from_base.translation()),
+      pose_(0.0, 0.0, odom_from_base.yaw),
+      calibrated_(columnsOf(states.calibration_std)) {
   pose_error_ = errors_.add(covariance);
-  if (!states.calibration_std.isZero()) {
-    calibration_error_ = errors_.add(states.calibration_std.cwiseAbs2().asDiagonal().toDenseMatrix());
-  }
+  if (calibrated_.cols() > 0) calibration_error_ = errors_.add(calibrationCovarianceAtFirst());
   if (states.gyro_bias_std > 0.0) {
     gyro_bias_error_ = errors_.add(MatrixXd::Constant(1, 1, states.gyro_bias_std * states.gyro_bias_std));
   }
@@ -57,25 +77,23 @@ double MultiCloneFilter::varianceOf(const std::optional<Part>& part) const {
 
 WheelCalibration MultiCloneFilter::calibration() const {
   if (!calibration_error_) return {};
-  return {calibration_, symmetric(errors_.covariance(*calibration_error_))};
+  return {calibration_, calibrated_ * symmetric(errors_.covariance(*calibration_error_)) * calibrated_.transpose()};
+}
+
+Eigen::MatrixXd MultiCloneFilter::calibrationCovarianceAtFirst() const {
+  return (calibrated_.transpose() * options_.calibration_std).cwiseAbs2().asDiagonal();
 }
 
 // ---- motion
 
-/// ∂u/∂(s, r, k, l)
-WheelCalibration::Jacobian MultiCloneFilter::byCalibration(const SE2& u) {
-  WheelCalibration::Jacobian B = WheelCalibration::Jacobian::Zero();
-  B.topLeftCorner<2, 1>() = u.translation();
-  B.block<1, 2>(2, 1) << u.yaw, u.translation().norm();
-  B.topRightCorner<2, 1>() << std::cos(u.yaw) - 1.0, std::sin(u.yaw);
-  return B;
-}
+/// By those that are estimated.
+Eigen::Matrix3Xd MultiCloneFilter::byCalibration(const SE2& u) const { return byWheelCalibration(u) * calibrated_; }
 
 OdometryIncrement MultiCloneFilter::calibrated(const OdometryIncrement& increment) const {
   OdometryIncrement motion = increment;
   if (!increment.by_wheels) return motion;
   const SE2& u = increment.before_from_after;
-  motion.before_from_after = corrected(u, byCalibration(u) * calibration_);
+  motion.before_from_after = corrected(u, byWheelCalibration(u) * calibration_);
   return motion;
 }
 
@@ -98,7 +116,7 @@ void MultiCloneFilter::propagate(const OdometryIncrement& increment) {
 /// The wheels' noise is a part of the state while others tell of the motion.
 void MultiCloneFilter::measureMotion(const OdometryIncrement& increment, const Matrix3d& W) {
   WheelCalibration::Jacobian B = WheelCalibration::Jacobian::Zero();
-  if (increment.by_wheels) B = byCalibration(increment.before_from_after);
+  if (increment.by_wheels) B = byWheelCalibration(increment.before_from_after);
   const Vector3d u = increment.before_from_after.vector();
   const auto expected = [&](const Vector3d& noise) -> Vector3d { return u + B * calibration_ + noise; };
   const auto measurement = [&](const MotionMeasurement& z, const Vector3d& noise, const std::optional<Part>& part) {
@@ -106,7 +124,7 @@ void MultiCloneFilter::measureMotion(const OdometryIncrement& increment, const M
     m.residual = z.value - z.seen * expected(noise);
     if (z.bias_time > 0.0) m.residual(0) -= z.bias_time * gyro_bias_;
     if (part) m.terms.push_back({*part, z.seen});
-    if (calibration_error_) m.terms.push_back({*calibration_error_, z.seen * B});
+    if (calibration_error_) m.terms.push_back({*calibration_error_, z.seen * B * calibrated_});
     if (gyro_bias_error_ && z.bias_time > 0.0) {
       m.terms.push_back({*gyro_bias_error_, MatrixXd::Constant(1, 1, z.bias_time)});
     }
@@ -134,7 +152,7 @@ OdometryIncrement MultiCloneFilter::refined(const OdometryIncrement& increment) 
   OdometryIncrement motion = calibrated(increment);
   Matrix3d& Q = motion.covariance;
   if (calibration_error_ && increment.by_wheels) {
-    const WheelCalibration::Jacobian B = byCalibration(increment.before_from_after);
+    const Eigen::Matrix3Xd B = byCalibration(increment.before_from_after);
     Q += symmetric(B * errors_.covariance(*calibration_error_) * B.transpose());
   }
   for (const MotionMeasurement& z : increment.measured) {
@@ -157,9 +175,9 @@ OdometryIncrement MultiCloneFilter::refined(const OdometryIncrement& increment) 
 void MultiCloneFilter::forgetCalibration(double way) {
   const double kept = std::exp(-way / options_.calibration_way);
   calibration_ *= kept;
-  errors_.move(*calibration_error_, (kept - 1.0) * Eigen::Matrix4d::Identity(), *calibration_error_);
-  errors_.disturb(*calibration_error_,
-                  (1.0 - kept * kept) * options_.calibration_std.cwiseAbs2().asDiagonal().toDenseMatrix());
+  const Eigen::Index n = calibrated_.cols();
+  errors_.move(*calibration_error_, (kept - 1.0) * MatrixXd::Identity(n, n), *calibration_error_);
+  errors_.disturb(*calibration_error_, (1.0 - kept * kept) * calibrationCovarianceAtFirst());
 }
 
 void MultiCloneFilter::age(double dt) {
@@ -311,7 +329,7 @@ std::vector<Eigen::VectorXd> MultiCloneFilter::correct(const Measurement& measur
     const Eigen::VectorXd& c = corrections[i];
     const auto is = [&](const std::optional<Part>& part) { return part && part->row == parts[i].row; };
     if (is(pose_error_)) pose_ = compose(exponential(c), pose_);
-    if (is(calibration_error_)) calibration_ += c;
+    if (is(calibration_error_)) calibration_ += calibrated_ * c;
     if (is(gyro_bias_error_)) gyro_bias_ += c(0);
     if (is(compass_error_)) compass_from_world_ += c(0);
     for (Clone& clone : clones_) {

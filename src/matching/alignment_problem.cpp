@@ -3,12 +3,17 @@
 #include <mrpt/poses/CPose2D.h>
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 namespace sckf {
 
 namespace {
 
 double square(double v) { return v * v; }
+
+/// From a to b [rad].
+double angleBetween(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return std::atan2(quarterTurn(a).dot(b), a.dot(b)); }
 
 /// The points of the current scan with their nearest neighbours in the reference, by MRPT's k-d tree.
 mrpt::tfest::TMatchingPairList nearestNeighbours(const PreparedScan& reference, const PreparedScan& current,
@@ -49,6 +54,7 @@ AlignmentProblem::AlignmentProblem(const PreparedScan& reference, const Prepared
       addPointPair(pair, options);
     }
   }
+  weighByTurn(motion, options);
   fitKernel(motion, options);
 }
 
@@ -84,6 +90,22 @@ void AlignmentProblem::addPointPair(const Pair& pair, const PairOptions& options
                         std::sqrt(variance + 0.06 * step.squaredNorm())});
   residuals_.push_back(
       {pair.reference, pair.current, along, anchor, nullptr, std::sqrt(variance + step.squaredNorm())});
+}
+
+/// What few beams see of a step in a wall is straight within noise, too, and from the next place it is another surface:
+/// along a corridor nothing else would seem to tell of the way. Most surfaces are turned by what the yaw is off.
+void AlignmentProblem::weighByTurn(const RigidMotion& reference_from_current, const PairOptions& options) {
+  std::vector<std::pair<double, Residual*>> turns;
+  for (Residual& residual : residuals_) {
+    const Surface& seen = current_.surface[static_cast<std::size_t>(residual.current)];
+    if (residual.surface == nullptr || !seen.valid()) continue;
+    turns.emplace_back(angleBetween(residual.normal, reference_from_current.C * seen.normal), &residual);
+  }
+  if (turns.empty()) return;
+  const auto middle = turns.begin() + static_cast<std::ptrdiff_t>(turns.size() / 2);
+  std::nth_element(turns.begin(), middle, turns.end());
+  const double median = middle->first;
+  for (const auto& [turn, residual] : turns) residual->std *= std::hypot(1.0, (turn - median) / options.normal_agreement);
 }
 
 void AlignmentProblem::fitKernel(const RigidMotion& reference_from_current, const PairOptions& options) {

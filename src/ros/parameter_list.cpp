@@ -98,8 +98,8 @@ List otherSensors(PipelineOptions& pipeline) {
   ImuOptions& imu = pipeline.imu;
   StandstillOptions& standstill = pipeline.standstill;
   return {
+      number("calibration_distance_std", calibration.distance_std, within(0.0, 1.0)),
       flag("calibrate_odometry", calibration.on),
-      number("calibration_distance_std", calibration.distance_std, aboveUpTo(0.0, 1.0)),
       number("calibration_rotation_std", calibration.rotation_std, aboveUpTo(0.0, 1.0)),
       number("calibration_rotation_per_meter_std", calibration.rotation_per_meter_std, aboveUpTo(0.0, 1.0), "rad/m"),
       number("calibration_laser_ahead_std", calibration.laser_ahead_std, aboveUpTo(0.0, 1.0), "m"),
@@ -215,6 +215,7 @@ List matcherParameters(MatcherOptions& matcher) {
       number("max_refinement", matcher.max_refinement, aboveUpTo(0.0, 100.0), "m, rad"),
       number("max_correspondence_dist", pairs.max_distance, aboveUpTo(0.0, 100.0), "m"),
       number("max_normal_angle", pairs.max_normal_angle, aboveUpTo(0.0, 10.0), "rad"),
+      number("normal_agreement", pairs.normal_agreement, aboveUpTo(0.0, 1000.0), "rad"),
       number("surface_roughness", pairs.surface_roughness, within(0.0, 10.0), "m"),
       number("point_std", pairs.point_std, aboveUpTo(0.0, 100.0), "m"),
       number("robust_width", pairs.robust_width, aboveUpTo(0.0, 1000.0)),

@@ -143,5 +143,27 @@ TEST(OtherMeasurements, TheCalibrationForgetsAndNeverRunsAway) {
   EXPECT_NEAR(filter.calibration().covariance(0, 0), 0.01, 1e-4) << "as uncertain as at the start, and no more";
 }
 
+TEST(OtherMeasurements, OneErrorOfTheWheelsAloneIsEstimatedWhereTheOthersHaveNoStd) {
+  StateOptions states;
+  states.calibration_std(2) = 0.05;  // [rad/m]
+  states.calibration_way = 1e12;
+  MultiCloneFilter filter(SE2(), Eigen::Matrix3d::Zero(), states);
+  const Eigen::VectorXd no_ranges(0);
+  filter.clone(no_ranges);
+  filter.propagate({SE2(1.0, 0.0, 0.0), 4e-4 * Eigen::Matrix3d::Identity()});
+  Displacement z;
+  z.reference_from_current = SE2(1.0, 0.0, 0.04);
+  z.J_reference = z.J_current = Eigen::MatrixXd::Zero(3, 0);
+  z.variance_reference = z.variance_current = no_ranges;
+  z.matching_noise = 1e-4 * Eigen::Matrix3d::Identity();
+  filter.update(z, filter.innovation(z));
+  const double gain = 25e-4 / (25e-4 + 4e-4 + 1e-4);  // of a yaw that is k times 1 m, and noise
+  const WheelCalibration found = filter.calibration();
+  EXPECT_TRUE(matricesNear(found.error, Eigen::Vector4d(0.0, 0.0, 0.04 * gain, 0.0), 1e-12));
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+  covariance(2, 2) = 25e-4 * (1.0 - gain);
+  EXPECT_TRUE(matricesNear(found.covariance, covariance, 1e-12));
+}
+
 }  // namespace
 }  // namespace sckf

@@ -123,7 +123,9 @@ TEST(ScanOdometry, AReferenceIsKeptOverSeveralScansUnlessTheDistancesAreZero) {
 /// scan on by the wheels from the scan's estimate.
 TEST(ScanOdometry, TheLatestEstimateGoesOnFromTheScansByTheWheels) {
   const SimulatedDrive drive;
-  Driven driven(drive);
+  PipelineOptions options;
+  options.calibration.distance_std = 0.0;
+  Driven driven(drive, options);
   driven.odometry(0);
   EXPECT_EQ(driven.pipeline.latest()->stamp, at(0));
   EXPECT_TRUE(driven.pipeline.latest()->odom_from_base.vector().isZero(0.0));
@@ -154,6 +156,7 @@ Eigen::Matrix3d afterOneStep(const std::optional<Eigen::Matrix3d>& stated, bool 
   const SimulatedDrive drive;
   PipelineOptions options;
   options.prefer_twist_covariance = prefer;
+  options.calibration.distance_std = 0.0;
   ScanOdometry pipeline(options);
   pipeline.addOdometry(drive.odometry(0));
   OdometrySample sample = drive.odometry(20);

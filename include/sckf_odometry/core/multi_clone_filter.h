@@ -77,7 +77,8 @@ class MultiCloneFilter : public LandmarkStates {
   SE2 inWorld(const SE2& pose) const;
   double varianceOf(const std::optional<Part>& part) const;
   OdometryIncrement calibrated(const OdometryIncrement& increment) const;
-  static WheelCalibration::Jacobian byCalibration(const SE2& motion);
+  Eigen::MatrixXd calibrationCovarianceAtFirst() const;
+  Eigen::Matrix3Xd byCalibration(const SE2& motion) const;
   void forgetCalibration(double way);
   void measureMotion(const OdometryIncrement& motion, const Eigen::Matrix3d& W);
   Measurement measurement(const Displacement& displacement, const Innovation& innovation) const;
@@ -99,6 +100,7 @@ class MultiCloneFilter : public LandmarkStates {
   std::optional<ErrorState::Ranges> present_;  // of the present scan, once it has been used
 
   Eigen::Vector4d calibration_ = Eigen::Vector4d::Zero();
+  Eigen::Matrix4Xd calibrated_;  // a column of the identity for each of the four that is estimated
   std::optional<Part> calibration_error_;
   double gyro_bias_ = 0.0;  // [rad/s]
   std::optional<Part> gyro_bias_error_;

@@ -14,6 +14,7 @@ namespace sckf {
 struct PairOptions {
   double max_distance = 0.2;        ///< [m] two points farther apart are no pair
   double max_normal_angle = 1.05;   ///< [rad] nor are points on surfaces that are turned more against each other
+  double normal_agreement = 0.2;    ///< [rad] pairs whose surfaces are turned by so much more than most weigh half
   double surface_roughness = 0.01;  ///< [m] std of a surface about the straight line fitted to it
   double point_std = 0.02;          ///< [m] std of a point on no straight surface, beside range noise and point spacing
   double robust_width = 3.0;        ///< a residual of this many std weighs half (Cauchy)
@@ -104,6 +105,7 @@ class AlignmentProblem {
  private:
   void addSurfacePair(const Pair& pair, const RigidMotion& reference_from_current, const PairOptions& options);
   void addPointPair(const Pair& pair, const PairOptions& options);
+  void weighByTurn(const RigidMotion& reference_from_current, const PairOptions& options);
   void fitKernel(const RigidMotion& reference_from_current, const PairOptions& options);
 
   const PreparedScan& reference_;

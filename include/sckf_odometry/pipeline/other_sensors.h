@@ -7,14 +7,15 @@
 
 namespace sckf {
 
-/// Systematic errors of the wheels as states, which scans find where they tell the motion. See WheelCalibration.
+/// Systematic errors of the wheels as states, which scans find where they tell the motion. See WheelCalibration. Only
+/// method sckf_multi has them.
 struct CalibrationOptions {
-  bool on = false;
-  double distance_std = 0.05;            ///< how large the error of the way can be, as a share of it …
-  double rotation_std = 0.05;            ///< … that of a rotation …
+  double distance_std = 0.02;            ///< how large the error of the way can be, as a share of it; 0: it has none
+  bool on = false;                       ///< there are others …
+  double rotation_std = 0.05;            ///< … that of a rotation, as large …
   double rotation_per_meter_std = 0.05;  ///< [rad/m] … the rotation that goes with the way …
   double laser_ahead_std = 0.1;          ///< [m] … and how much farther ahead the laser is of where the wheels turn about
-  double way = 100.0;                    ///< [m] within which they are forgotten
+  double way = 1000.0;                   ///< [m] within which they are forgotten
 };
 
 /// What an IMU is used for, and how far it is trusted.
@@ -31,7 +32,7 @@ struct ImuOptions {
   bool isUsed() const { return gyro || orientation; }
 };
 
-/// The states that the filter has for what is on.
+/// The states that the filter has for what is on, if its method has any.
 StateOptions statesFor(const CalibrationOptions& calibration, const ImuOptions& imu);
 
 /// The rotation in dt [s] as a gyro tells it, for an increment of which others tell this much.
