@@ -13,7 +13,9 @@ namespace {
 double square(double v) { return v * v; }
 
 /// From a to b [rad].
-double angleBetween(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return std::atan2(quarterTurn(a).dot(b), a.dot(b)); }
+double angleBetween(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return std::atan2(quarterTurn(a).dot(b), a.dot(b));
+}
 
 /// The points of the current scan with their nearest neighbours in the reference, by MRPT's k-d tree.
 mrpt::tfest::TMatchingPairList nearestNeighbours(const PreparedScan& reference, const PreparedScan& current,
