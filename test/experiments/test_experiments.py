@@ -226,7 +226,7 @@ class AllExperiments(unittest.TestCase):
 
     def test_with_landmarks_beside_displacements_the_second_pass_falls_on_the_first(self) -> None:
         n = self.numbers("extensions")
-        self.assertLess(n["landmarks_lines_end"], 0.09, n)
+        self.assertLess(n["landmarks_lines_end"], 0.1, n)
         for landmarks in ("corners", "corners_and_lines"):
             self.assertLess(n[f"landmarks_{landmarks}_end"], 0.06, n)
         self.assertEqual(len({n[f"landmarks_{key}_end"] for key in ("none", "corners", "lines", "corners_and_lines")}), 4,
