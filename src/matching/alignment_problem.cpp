@@ -12,10 +12,8 @@ namespace {
 
 double square(double v) { return v * v; }
 
-/// From a to b [rad].
-double angleBetween(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return std::atan2(quarterTurn(a).dot(b), a.dot(b));
-}
+/// From a to b, both of length 1: the sine.
+double turnBetween(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return quarterTurn(a).dot(b); }
 
 /// The points of the current scan with their nearest neighbours in the reference, by MRPT's k-d tree.
 mrpt::tfest::TMatchingPairList nearestNeighbours(const PreparedScan& reference, const PreparedScan& current,
@@ -45,7 +43,7 @@ Eigen::Vector2d toNextPoint(const ScannedPoints& points, std::size_t i) {
 
 AlignmentProblem::AlignmentProblem(const PreparedScan& reference, const PreparedScan& current,
                                    const SE2& reference_from_current, double max_distance, const PairOptions& options)
-    : reference_(reference), current_(current) {
+    : reference_(reference), current_(current), paired_at_(reference_from_current) {
   const RigidMotion motion(reference_from_current);
   for (const auto& match : nearestNeighbours(reference, current, reference_from_current, max_distance)) {
     const Pair pair{static_cast<int>(match.globalIdx), static_cast<int>(match.localIdx)};
@@ -98,16 +96,18 @@ void AlignmentProblem::addPointPair(const Pair& pair, const PairOptions& options
 /// along a corridor nothing else would seem to tell of the way. Most surfaces are turned by what the yaw is off.
 void AlignmentProblem::weighByTurn(const RigidMotion& reference_from_current, const PairOptions& options) {
   std::vector<std::pair<double, Residual*>> turns;
+  turns.reserve(residuals_.size());
   for (Residual& residual : residuals_) {
     const Surface& seen = current_.surface[static_cast<std::size_t>(residual.current)];
     if (residual.surface == nullptr || !seen.valid()) continue;
-    turns.emplace_back(angleBetween(residual.normal, reference_from_current.C * seen.normal), &residual);
+    turns.emplace_back(turnBetween(residual.normal, reference_from_current.C * seen.normal), &residual);
   }
   if (turns.empty()) return;
   const auto middle = turns.begin() + static_cast<std::ptrdiff_t>(turns.size() / 2);
   std::nth_element(turns.begin(), middle, turns.end());
   const double median = middle->first;
-  for (const auto& [turn, residual] : turns) residual->std *= std::hypot(1.0, (turn - median) / options.normal_agreement);
+  for (const auto& [turn, residual] : turns)
+    residual->std *= std::hypot(1.0, (turn - median) / options.normal_agreement);
 }
 
 void AlignmentProblem::fitKernel(const RigidMotion& reference_from_current, const PairOptions& options) {
@@ -128,6 +128,31 @@ void AlignmentProblem::fitKernel(const RigidMotion& reference_from_current, cons
 
 double AlignmentProblem::overlap() const {
   return static_cast<double>(pairs_.size()) / static_cast<double>(current_.size());
+}
+
+int AlignmentProblem::contradictions() const {
+  const auto countOf = [](const PreparedScan& scan, const std::vector<bool>& paired, const PreparedScan& other,
+                          const RigidMotion& other_from_scan) {
+    int count = 0;
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+      const Eigen::Vector2d p = other_from_scan.C * scan.points.point[i] + other_from_scan.t;
+      if (!paired[i] && other.free_space.contains(p)) ++count;
+    }
+    return count;
+  };
+  std::vector<bool> of_reference(reference_.size(), false);
+  std::vector<bool> of_current(current_.size(), false);
+  for (const Pair& pair : pairs_) {
+    of_reference[static_cast<std::size_t>(pair.reference)] = true;
+    of_current[static_cast<std::size_t>(pair.current)] = true;
+  }
+  return countOf(current_, of_current, reference_, RigidMotion(paired_at_)) +
+         countOf(reference_, of_reference, current_, RigidMotion(inverse(paired_at_)));
+}
+
+double AlignmentProblem::agreement() const {
+  const auto paired = static_cast<double>(pairs_.size());
+  return paired / std::max(1.0, paired + contradictions());
 }
 
 ResidualTerms AlignmentProblem::terms(const Residual& residual, const RigidMotion& reference_from_current) const {
@@ -167,15 +192,19 @@ Eigen::Vector3d AlignmentProblem::derivativeByNormal(const Residual& residual, c
 }
 
 double AlignmentProblem::cost(const SE2& reference_from_current) const {
-  constexpr double kUnpaired = 3.0;
+  constexpr double kContradiction = 3.0;
+  constexpr double kFewest = 0.3;  // of the points: so many are compared in any case, as contradictions
   const RigidMotion motion(reference_from_current);
   const RobustKernel kernel{2.0};  // one for all alignments, whatever their own scale
-  double sum = kUnpaired * static_cast<double>(current_.size() - pairs_.size());
+  double sum = 0.0;
   for (const Residual& residual : residuals_) {
     const double share = residual.surface != nullptr ? 1.0 : 0.5;
-    sum += share * std::min(kUnpaired, kernel.loss(terms(residual, motion).e));
+    sum += share * std::min(kContradiction, kernel.loss(terms(residual, motion).e));
   }
-  return sum;
+  const auto points = static_cast<double>(current_.size());
+  const auto paired = static_cast<double>(pairs_.size());
+  const double contradicting = contradictions() + std::max(0.0, kFewest * points - paired);
+  return points * (sum + kContradiction * contradicting) / (paired + contradicting);
 }
 
 }  // namespace sckf

@@ -20,7 +20,7 @@ using MatrixD3 = Displacement::MatrixD3;
 /// Minimises the robust loss in the seen directions, pairs and weights fixed.
 SE2 minimise(const AlignmentProblem& problem, SE2 x, const ObservableDirections& seen) {
   constexpr int kMaxIterations = 30;
-  constexpr double kStep = 1e-10;
+  constexpr double kStep = 1e-9;
   for (int i = 0; i < kMaxIterations; ++i) {
     const auto equations = problem.normalEquations(x);
     const MatrixDD information = seen.basis.transpose() * equations.information * seen.basis;
@@ -43,10 +43,10 @@ struct LossDerivatives {
       : by_reference(Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(problem.reference().beams))),
         by_current(Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(problem.current().beams))) {}
 
-  Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();  // ∂²L/∂x²
-  Eigen::Matrix3Xd by_reference;                      // ∂²L/∂x∂z_k, 3 × M_k
-  Eigen::Matrix3Xd by_current;                        // ∂²L/∂x∂z_{k+m}, 3 × M_{k+m}
-  std::vector<BeamBlock> blocks;                      // of which the hessian is the sum
+  Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();      // ∂²L/∂x²
+  Eigen::Matrix3Xd by_reference;                          // ∂²L/∂x∂z_k, 3 × M_k
+  Eigen::Matrix3Xd by_current;                            // ∂²L/∂x∂z_{k+m}, 3 × M_{k+m}
+  std::vector<BeamBlock> blocks;                          // of which the hessian is the sum
   Eigen::Matrix4d with_offset = Eigen::Matrix4d::Zero();  // Σ w a aᵀ, a = ∂e/∂(x, c), c: an offset of all ranges
   Eigen::Vector4d gradient_with_offset = Eigen::Vector4d::Zero();  // Σ w e a
   double loss_weight = 0.0;
@@ -56,7 +56,7 @@ struct LossDerivatives {
 /// A surface's line turns and shifts with every range that it was fitted to. Returns by how much more the current point
 /// is before it when all of them are longer.
 double addSurfaceDerivatives(const AlignmentProblem& problem, const Residual& residual, const ResidualTerms& t,
-                           LossDerivatives& out) {
+                             LossDerivatives& out) {
   const Surface& surface = *residual.surface;
   const ScannedPoints& points = problem.reference().points;
   const double along = surface.tangent().dot(t.offset);
@@ -155,12 +155,13 @@ MatrixDD matchingNoise(const MatrixDD& range_covariance, const MatrixDD& seen_co
 /// seen: the offset would make up for what the prediction is wrong by there.
 RangeOffsetEvidence rangeOffset(const AlignmentProblem& problem, const LossDerivatives& loss,
                                 const ObservableDirections& seen) {
-  // Of surfaces fitted across what is not straight, as far as noise lets them: by simulation 1 to 4 mm for 1 cm of noise,
-  // which turn a displacement by next to nothing.
+  // Of surfaces fitted across what is not straight, as far as noise lets them: by simulation 1 to 4 mm for 1 cm of
+  // noise, which turn a displacement by next to nothing.
   constexpr double kBias = 20.0;  // [1/m]
   // Less than this, a residual's derivative by the offset (1: of a wall seen from one side, then from the other) is not
-  // of the motion but of noise in directions of surfaces. That is the residuals' own noise, so it would tell of an offset
-  // in every pair of scans that are near each other: 8 cm, after a while of scans that are compared with the last one.
+  // of the motion but of noise in directions of surfaces. That is the residuals' own noise, so it would tell of an
+  // offset in every pair of scans that are near each other: 8 cm, after a while of scans that are compared with the
+  // last one.
   constexpr double kDerivativeNoise = 0.03;
   if (seen.dimension() < 3) return {};
   const Eigen::Vector3d coupling = loss.with_offset.topRightCorner<3, 1>();

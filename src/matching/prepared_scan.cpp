@@ -11,6 +11,10 @@ namespace {
 /// Largest tilt of the plane of the laser against the x-y plane of base_link: beyond, its points are no floor plan.
 constexpr double kMaxTilt = 20.0 * M_PI / 180.0;
 
+/// What stands so much in front of what a beam has seen may still be a part of it [m], and [std of a range].
+constexpr double kDepth = 0.15;
+constexpr double kDepthInNoise = 4.0;
+
 /// The median of the absolute values, scaled to the standard deviation of a Gaussian.
 double robustStd(std::vector<double> values) {
   constexpr double kGaussian = 1.4826;
@@ -151,6 +155,8 @@ std::shared_ptr<const PreparedScan> prepareScan(const LaserScan& scan, const Eig
   prepared->angle_increment = scan.angle_increment;
   prepared->range_offset = options.range_offset;
   prepared->range_noise = estimateRangeNoise(prepared->points, scan.angle_increment, options);
+  prepared->free_space =
+      FreeSpace(scan, base_from_laser, prepared->points, std::max(kDepth, kDepthInNoise * prepared->range_noise));
   describe(*prepared, options.surface);
   return prepared;
 }
@@ -163,6 +169,7 @@ std::shared_ptr<const PreparedScan> setAside(const PreparedScan& scan, const std
   rest->angle_increment = scan.angle_increment;
   rest->range_noise = scan.range_noise;
   rest->range_offset = scan.range_offset;
+  rest->free_space = scan.free_space;
   rest->set_aside = scan.set_aside;
   for (std::size_t i = 0; i < scan.size(); ++i) {
     if (aside[i]) {

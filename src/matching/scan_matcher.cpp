@@ -17,9 +17,12 @@ namespace {
 /// Where the search for the displacement has come to.
 struct Alignment {
   SE2 reference_from_current;
-  double cost = 0.0;      // of the points: smaller is better
-  double surprise = 0.0;  // squared Mahalanobis distance from the prior
+  double surprise = 0.0;   // squared Mahalanobis distance from the prior
+  double agreement = 0.0;  // of the problem
   AlignmentProblem problem;
+
+  /// Of the points: smaller is better.
+  double cost() const { return problem.cost(reference_from_current); }
 };
 
 /// The search for one displacement: scans, prior and options of a call of match().
@@ -33,30 +36,29 @@ class Search {
         prior_information_((prediction.covariance + priorFloor(options)).inverse()),
         options_(options) {}
 
-  /// From the predicted displacement; if the scans do not fall together there, from the best of other yaws too; and if
-  /// they still do not by far, from wherever they may.
+  /// From the predicted displacement; if the scans do not fall together there, from where CICP finds that they do, from
+  /// there and from the best of other yaws; and if they still do not by far, from wherever they may.
   std::optional<Alignment> run() const {
-    std::optional<Alignment> best = align(mean_);
+    std::optional<Alignment> best = runNear();
     if (best && !suspicious(*best)) return best;
-    if (options_.search_yaw_steps > 0) {
-      std::optional<Alignment> other = align(bestOtherYaw());
-      if (other && (!best || cost(*other) < cost(*best))) best.emplace(std::move(*other));
-    }
+    keepBetter(best, align(icp(mean_), options_.icp_pair_distance));
+    if (best && !suspicious(*best)) return best;
+    if (options_.search_yaw_steps > 0) keepBetter(best, align(icp(bestOtherYaw()), options_.icp_pair_distance));
     if (options_.wide_search.yaw > 0.0 && !(best && fits(*best))) {
       std::optional<Alignment> far = farAway();
-      const double gain = kGain * static_cast<double>(current_.size());
-      if (far && (!best || far->cost + gain < best->cost)) best.emplace(std::move(*far));
+      if (far && (!best || better(*far, *best))) best.emplace(std::move(*far));
     }
     return best;
   }
 
-  /// From the predicted displacement, which is good, and nowhere else.
-  std::optional<Alignment> runNear() const { return align(mean_, true); }
+  /// From the predicted displacement and nowhere else.
+  std::optional<Alignment> runNear() const { return align(mean_, options_.pairs.max_distance); }
 
  private:
   static constexpr double kRough = 2.0;      // residuals of twice what noise explains
   static constexpr double kSurprise = 16.0;  // four sigma from the prior
   static constexpr double kGain = 0.3;       // of the points' cost, for each: for less the prior is not given up
+  static constexpr double kAgreesBetter = 0.05;
 
   static Eigen::Matrix3d priorFloor(const MatcherOptions& options) {
     return Eigen::Vector3d(options.prior_std_translation, options.prior_std_translation, options.prior_std_yaw)
@@ -85,7 +87,11 @@ class Search {
     const Eigen::Vector3d bounds(options_.wide_search.translation, options_.wide_search.translation,
                                  options_.wide_search.yaw);
     const Search search(reference_, current_, {mean_, bounds.cwiseAbs2().asDiagonal()}, options_);
-    return search.align(widelySearched(reference_, current_, mean_, options_.wide_search));
+    std::optional<Alignment> best;
+    for (const SE2& place : widelySearched(reference_, current_, mean_, options_.wide_search)) {
+      keepBetter(best, search.align(search.icp(place), options_.icp_pair_distance));
+    }
+    return best;
   }
 
   SE2 icp(const SE2& start) const {
@@ -104,27 +110,28 @@ class Search {
     return {mean.x(), mean.y(), mean.phi()};
   }
 
-  /// CICP, then the maximum of the posterior of surfaces and prior: the prior decides which points belong together in
-  /// directions that the scans hardly see, where CICP slides. Empty with too few pairs.
-  std::optional<Alignment> align(const SE2& start, bool near = false) const {
+  /// The maximum of the posterior of surfaces and prior, that is nearest to a start: the prior decides which points
+  /// belong together in directions that the scans hardly see, where CICP slides. Points are paired up to a distance at
+  /// first, and up to max_distance in the end. Empty with too few pairs.
+  std::optional<Alignment> align(SE2 x, double distance) const {
     constexpr double kSettled = 1e-3;  // [m, rad] points do not change partners for less; the estimate finds the rest
-    SE2 x = near ? start : icp(start);
-    double distance = near ? options_.pairs.max_distance : options_.icp_pair_distance;
-    for (int i = 0; i < options_.max_iterations; ++i) {
-      const AlignmentProblem problem(reference_, current_, x, distance, options_.pairs);
-      if (tooFew(problem)) return std::nullopt;
+    for (int i = 1;; ++i) {
+      AlignmentProblem problem(reference_, current_, x, distance, options_.pairs);
+      if (problem.pairs().size() < static_cast<std::size_t>(options_.min_pairs)) return std::nullopt;
       const Eigen::Vector3d step = mapStep(problem.normalEquations(x), x);
       x = corrected(x, step);
-      const bool settled = step.cwiseAbs().maxCoeff() < kSettled;
-      if (settled && distance <= options_.pairs.max_distance) break;
+      const bool settled = step.cwiseAbs().maxCoeff() < kSettled || i >= options_.max_iterations;
+      if (settled && distance <= options_.pairs.max_distance) {
+        const double agreement = problem.agreement();
+        return Alignment{x, surprise(x), agreement, std::move(problem)};
+      }
       distance = std::max(options_.pairs.max_distance, 0.6 * distance);
     }
-    AlignmentProblem problem(reference_, current_, x, options_.pairs.max_distance, options_.pairs);
-    if (tooFew(problem)) return std::nullopt;
+  }
+
+  double surprise(const SE2& x) const {
     const Eigen::Vector3d e = error(x, mean_);
-    const double surprise = e.dot(prior_information_ * e);
-    const double cost = problem.cost(x);
-    return Alignment{x, cost, surprise, std::move(problem)};
+    return e.dot(prior_information_ * e);
   }
 
   /// A step towards the maximum of the posterior, in which the scans have a say where they see and the prior elsewhere.
@@ -139,23 +146,31 @@ class Search {
     return -information.ldlt().solve(gradient);
   }
 
-  bool tooFew(const AlignmentProblem& problem) const {
-    return problem.pairs().size() < static_cast<std::size_t>(options_.min_pairs);
-  }
-
   /// Of the points and of the prior, to compare alignments with. Neighbouring points err alike, as on a wall that looks
   /// rough, so that a few tell as much as one: the prior counts so many times.
   static double cost(const Alignment& alignment) {
     constexpr double kAlike = 4.0;
-    return alignment.cost + kAlike * 0.5 * alignment.surprise;
+    return alignment.cost() + kAlike * 0.5 * alignment.surprise;
+  }
+
+  static void keepBetter(std::optional<Alignment>& best, std::optional<Alignment> other) {
+    if (other && (!best || cost(*other) < cost(*best))) best.emplace(std::move(*other));
+  }
+
+  /// Whether a place far from the prediction explains clearly more of the points than one near it, or agrees better
+  /// than one that is far, too.
+  bool better(const Alignment& far, const Alignment& best) const {
+    const bool near = best.surprise <= kSurprise;
+    const double gain = near ? kGain * static_cast<double>(current_.size()) : 0.0;
+    return far.cost() + gain < best.cost() && (near || far.agreement > best.agreement + kAgreesBetter);
   }
 
   bool fits(const Alignment& alignment) const {
-    return alignment.problem.overlap() >= options_.wide_search_below_overlap && alignment.surprise <= kSurprise;
+    return alignment.agreement >= options_.wide_search_below_agreement && alignment.surprise <= kSurprise;
   }
 
   bool suspicious(const Alignment& alignment) const {
-    return alignment.problem.overlap() < options_.search_below_overlap || alignment.problem.scale() > kRough ||
+    return alignment.agreement < options_.search_below_agreement || alignment.problem.scale() > kRough ||
            alignment.surprise > kSurprise;
   }
 
@@ -182,10 +197,13 @@ Match concluded(const std::optional<Alignment>& aligned, const MatcherOptions& o
   std::optional<DisplacementEstimate> estimate = estimateDisplacement(aligned->problem, start, options.estimation);
   match.pairs = aligned->problem.pairs();
   match.overlap = aligned->problem.overlap();
+  match.agreement = aligned->agreement;
   match.residual_rms = estimate ? estimate->residual_rms : 0.0;
   if (estimate) match.range_offset = estimate->range_offset;
   if (match.overlap < options.min_overlap) {
     match.failure = MatchFailure::kNoOverlap;
+  } else if (match.agreement < options.min_agreement) {
+    match.failure = MatchFailure::kContradiction;
   } else if (!estimate) {
     match.failure = MatchFailure::kNotObservable;
   } else if (ranAway(estimate->displacement.reference_from_current, start, options)) {
@@ -221,6 +239,8 @@ std::string toString(MatchFailure failure) {
       return "too few pairs";
     case MatchFailure::kNoOverlap:
       return "no overlap";
+    case MatchFailure::kContradiction:
+      return "scans contradict each other";
     case MatchFailure::kDiverged:
       return "diverged";
     case MatchFailure::kNotObservable:

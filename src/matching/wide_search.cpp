@@ -5,14 +5,19 @@
 #include <cstdint>
 #include <vector>
 
+#include "sckf_odometry/matching/alignment_problem.h"
+
 namespace sckf {
 
 namespace {
 
 constexpr double kCell = 0.1;         // [m]
+constexpr int kBlock = 4;             // cells to a side, that are looked at together first
 constexpr double kYawStep = 0.04;     // [rad]: half a metre off at 12 m are two steps
 constexpr double kFarthest = 20.0;    // [m] points beyond tell too little at such steps
 constexpr std::size_t kPoints = 120;  // of the current scan, evenly taken
+constexpr std::size_t kPlaces = 3;    // at most
+constexpr int kTurnsApart = 8;        // of which any two are turned against each other by so much [kYawStep]
 
 struct Cell {
   int column;
@@ -23,18 +28,20 @@ Cell cellOf(const Eigen::Vector2d& point) {
   return {static_cast<int>(std::lround(point.x() / kCell)), static_cast<int>(std::lround(point.y() / kCell))};
 }
 
-/// How near each cell is to a point of a scan: 0 to kOnIt.
+/// How near a cell is to a point of a scan, 0 to kOnIt; or of a block of cells, the nearest.
 class NearnessGrid {
  public:
   static constexpr std::uint8_t kOnIt = 4;
 
-  explicit NearnessGrid(const std::vector<Eigen::Vector2d>& points) {
+  /// block: cells to a side. A block is named by the cell in it with the least column and row.
+  NearnessGrid(const std::vector<Eigen::Vector2d>& points, int block) {
+    const int first = -kReach - (block - 1);
     for (const Eigen::Vector2d& point : points) {
       if (point.norm() > kFarthest) continue;
       const Cell cell = cellOf(point);
-      for (int row = -2; row <= 2; ++row) {
-        for (int column = -2; column <= 2; ++column) {
-          const int away = std::max(std::abs(row), std::abs(column));
+      for (int row = first; row <= kReach; ++row) {
+        for (int column = first; column <= kReach; ++column) {
+          const int away = std::max(cellsAway(column, block), cellsAway(row, block));
           auto& nearness = nearness_[index(cell.column + column, cell.row + row)];
           nearness = std::max(nearness, static_cast<std::uint8_t>(kOnIt - 1.5 * away));
         }
@@ -42,16 +49,28 @@ class NearnessGrid {
     }
   }
 
-  int at(int column, int row) const {
-    const bool inside = std::abs(column) <= kHalf && std::abs(row) <= kHalf;
-    return inside ? nearness_[index(column, row)] : 0;
+  /// Of all cells, those that are moved by so many columns and rows.
+  int sum(const std::vector<Cell>& cells, int columns, int rows) const {
+    int sum = 0;
+    for (const Cell& cell : cells) sum += at(cell.column + columns, cell.row + rows);
+    return sum;
   }
 
  private:
-  static constexpr int kHalf = static_cast<int>(kFarthest / kCell) + 3;
+  static constexpr int kReach = 2;
+  static constexpr int kHalf = static_cast<int>(kFarthest / kCell) + kReach + kBlock;
   static constexpr int kWidth = 2 * kHalf + 1;
+
+  /// Along one axis, of a block that begins so many cells beside a point.
+  static int cellsAway(int offset, int block) { return std::max({0, offset, 1 - block - offset}); }
+
   static std::size_t index(int column, int row) {
     return static_cast<std::size_t>((row + kHalf) * kWidth + column + kHalf);
+  }
+
+  int at(int column, int row) const {
+    const bool inside = std::abs(column) <= kHalf && std::abs(row) <= kHalf;
+    return inside ? nearness_[index(column, row)] : 0;
   }
 
   std::vector<std::uint8_t> nearness_ = std::vector<std::uint8_t>(kWidth * kWidth, 0);
@@ -64,38 +83,94 @@ std::vector<Eigen::Vector2d> evenlyTaken(const std::vector<Eigen::Vector2d>& poi
   return taken;
 }
 
-}  // namespace
+/// The search: the places of one turn after the other, in blocks. No place in a block has a better score than the sum
+/// over the cells' nearest of the block, less the price of the one that is nearest to the prediction.
+class WideSearch {
+ public:
+  WideSearch(const PreparedScan& reference, const PreparedScan& current, const SE2& predicted,
+             const WideSearchOptions& options)
+      : by_cell_(reference.points.point, 1),
+        by_block_(reference.points.point, kBlock),
+        points_(evenlyTaken(current.points.point)),
+        predicted_(predicted),
+        turns_(static_cast<int>(options.yaw / kYawStep)),
+        steps_(static_cast<int>(options.translation / kCell)),
+        cells_(points_.size()) {}
 
-SE2 widelySearched(const PreparedScan& reference, const PreparedScan& current, const SE2& predicted,
-                   const WideSearchOptions& options) {
-  // Of all points, so many must tell against the prediction for one of its bounds to be reached.
-  constexpr double kPriceOfBound = 0.2;
-  const NearnessGrid grid(reference.points.point);
-  const std::vector<Eigen::Vector2d> points = evenlyTaken(current.points.point);
-  const int turns = static_cast<int>(options.yaw / kYawStep);
-  const int steps = static_cast<int>(options.translation / kCell);
-  const double price = kPriceOfBound * NearnessGrid::kOnIt * static_cast<double>(points.size());
-  double best = -1e9;
-  SE2 found = predicted;
-  std::vector<Cell> cells(points.size());
-  for (int turn = -turns; turn <= turns; ++turn) {
-    const SE2 turned(predicted.x, predicted.y, predicted.yaw + turn * kYawStep);
-    const Eigen::Matrix2d C = turned.rotation();
-    for (std::size_t i = 0; i < points.size(); ++i) cells[i] = cellOf(C * points[i] + turned.translation());
-    for (int y = -steps; y <= steps; ++y) {
-      for (int x = -steps; x <= steps; ++x) {
-        int sum = 0;
-        for (const Cell& cell : cells) sum += grid.at(cell.column + x, cell.row + y);
-        const double away = std::pow(static_cast<double>(turn) / std::max(turns, 1), 2) +
-                            static_cast<double>(x * x + y * y) / std::max(steps * steps, 1);
-        const double score = sum - price * away;
-        if (score <= best) continue;
-        best = score;
-        found = SE2(turned.x + x * kCell, turned.y + y * kCell, turned.yaw);
+  /// The best places of those turns at which it is better than at the turns beside, the best first.
+  std::vector<SE2> bestPlaces() {
+    std::vector<Place> of_turns;
+    for (int turn = -turns_; turn <= turns_; ++turn) of_turns.push_back(bestOfTurn(turn));
+    std::sort(of_turns.begin(), of_turns.end(), [](const Place& a, const Place& b) { return a.score > b.score; });
+    std::vector<SE2> best;
+    std::vector<int> turns;
+    for (const Place& place : of_turns) {
+      const bool beside_better =
+          std::any_of(turns.begin(), turns.end(), [&](int turn) { return std::abs(turn - place.turn) < kTurnsApart; });
+      if (beside_better) continue;
+      turns.push_back(place.turn);
+      best.emplace_back(predicted_.x + place.column * kCell, predicted_.y + place.row * kCell,
+                        predicted_.yaw + place.turn * kYawStep);
+      if (best.size() == kPlaces) break;
+    }
+    return best;
+  }
+
+ private:
+  struct Place {
+    double score;
+    int turn;
+    int column;
+    int row;
+  };
+
+  Place bestOfTurn(int turn) {
+    const RigidMotion motion({predicted_.x, predicted_.y, predicted_.yaw + turn * kYawStep});
+    for (std::size_t k = 0; k < points_.size(); ++k) cells_[k] = cellOf(motion.C * points_[k] + motion.t);
+    Place best{by_cell_.sum(cells_, 0, 0) - priceOf(turn, 0, 0), turn, 0, 0};
+    for (int row = -steps_; row <= steps_; row += kBlock) {
+      for (int column = -steps_; column <= steps_; column += kBlock) {
+        const double price = priceOf(turn, nearestTo0(column), nearestTo0(row));
+        if (by_block_.sum(cells_, column, row) - price > best.score) improve(best, column, row);
+      }
+    }
+    return best;
+  }
+
+  /// By the cells of a block.
+  void improve(Place& best, int column, int row) const {
+    for (int y = row; y < std::min(row + kBlock, steps_ + 1); ++y) {
+      for (int x = column; x < std::min(column + kBlock, steps_ + 1); ++x) {
+        const double score = by_cell_.sum(cells_, x, y) - priceOf(best.turn, x, y);
+        if (score > best.score) best = {score, best.turn, x, y};
       }
     }
   }
-  return found;
+
+  /// Of all points, so many must tell against the prediction for a place that is 1 m, or 1 rad, from it.
+  double priceOf(int turn, int column, int row) const {
+    constexpr double kPrice = 0.14;
+    const double away = kCell * kCell * (column * column + row * row) + kYawStep * kYawStep * turn * turn;
+    return kPrice * away * NearnessGrid::kOnIt * static_cast<double>(points_.size());
+  }
+
+  /// Of the cells of a block along an axis.
+  static int nearestTo0(int first) { return std::clamp(0, first, first + kBlock - 1); }
+
+  NearnessGrid by_cell_;
+  NearnessGrid by_block_;
+  std::vector<Eigen::Vector2d> points_;
+  SE2 predicted_;
+  int turns_;
+  int steps_;
+  std::vector<Cell> cells_;  // of the points, turned
+};
+
+}  // namespace
+
+std::vector<SE2> widelySearched(const PreparedScan& reference, const PreparedScan& current, const SE2& predicted,
+                                const WideSearchOptions& options) {
+  return WideSearch(reference, current, predicted, options).bestPlaces();
 }
 
 }  // namespace sckf

@@ -132,7 +132,7 @@ double ScanOdometry::gate(const Displacement& displacement) const {
 
 bool ScanOdometry::looksLikeSlip(const Match& match) const {
   return options_.gate.trust_scans_on_slip && match.displacement->dimension() >= 2 &&
-         match.overlap >= options_.gate.slip_min_overlap && match.residual_rms <= options_.gate.slip_max_residual;
+         match.agreement >= options_.gate.slip_min_agreement && match.residual_rms <= options_.gate.slip_max_residual;
 }
 
 void ScanOdometry::useHeading(ScanReport& report) {

@@ -272,6 +272,7 @@ sckf_odometry::Status toStatus(const ScanReport& report, const std::string& meth
   status.deskewed = report.deskewing == Deskewing::kDone;
   status.pairs = static_cast<uint32_t>(report.match.pairs.size());
   status.overlap = report.match.overlap;
+  status.agreement = report.match.agreement;
   status.residual_rms = report.match.residual_rms;
   if (report.innovation) {
     status.dimension = static_cast<uint8_t>(report.innovation->residual.size());

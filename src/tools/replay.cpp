@@ -97,7 +97,7 @@ void writeCsvHeader(OutputFile& file) {
       "reference_stamp,predicted_x,predicted_y,predicted_yaw,displacement_x,displacement_y,displacement_yaw,dimension,"
       "displacement_var_x,displacement_cov_xy,displacement_cov_xyaw,displacement_var_y,displacement_cov_yyaw,"
       "displacement_var_yaw,innovation_1,innovation_2,innovation_3,nis,"
-      "normalised_x,normalised_y,normalised_yaw,pairs,overlap,residual_rms,new_reference,outcome,reason\n");
+      "normalised_x,normalised_y,normalised_yaw,pairs,overlap,agreement,residual_rms,new_reference,outcome,reason\n");
 }
 
 void writePose(OutputFile& file, const SE2& pose) { file.print(",%.9f,%.9f,%.9f", pose.x, pose.y, pose.yaw); }
@@ -151,9 +151,9 @@ void writeCsvLine(OutputFile& file, const ScanReport& report) {
   } else {
     writeEmpty(file, 21);
   }
-  file.print(",%zu,%.6f,%.6f,%d,%s,\"%s\"\n", report.match.pairs.size(), report.match.overlap,
-             report.match.residual_rms, report.new_reference ? 1 : 0, toString(report.outcome).c_str(),
-             report.reason.c_str());
+  file.print(",%zu,%.6f,%.6f,%.6f,%d,%s,\"%s\"\n", report.match.pairs.size(), report.match.overlap,
+             report.match.agreement, report.match.residual_rms, report.new_reference ? 1 : 0,
+             toString(report.outcome).c_str(), report.reason.c_str());
 }
 
 /// Times of the scans' processing, and what became of them.
@@ -420,7 +420,8 @@ std::optional<Arguments> parse(int argc, char** argv) {
   po::notify(values);
   if (arguments.bag.empty()) throw po::error("a BAG is needed; see --help");
   if (!(arguments.start >= 0.0)) throw po::error("--start: expected 0 s or more");
-  if (values.count("duration") != 0 && !(arguments.duration > 0.0)) throw po::error("--duration: expected more than 0 s");
+  if (values.count("duration") != 0 && !(arguments.duration > 0.0))
+    throw po::error("--duration: expected more than 0 s");
   if (arguments.trajectory.empty() && arguments.csv.empty()) throw po::error("--trajectory or --csv is needed");
   return arguments;
 }

@@ -18,6 +18,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "scripts"))
+from backwards import turn_round  # noqa: E402
 from logs import MALAGA, installed, recorded, run, simulated  # noqa: E402
 from recording import halved, read_recording  # noqa: E402
 from revisit import closure, find_revisits  # noqa: E402
@@ -115,6 +116,17 @@ class DriftTest(unittest.TestCase):
 
     def test_freiburg_079(self) -> None:
         self.check_recorded("freiburg-079", 1.06, 0.107)
+
+    def check_backwards(self, log: str, percent: float, deg_per_m: float) -> None:
+        bag, tum = self.path("backwards.bag"), self.path("backwards.tum")
+        turn_round(recorded(log), recorded(log).with_suffix(".tum"), bag, tum)
+        self.check_drift(f"{log}, backwards", bag, tum, percent, deg_per_m)
+
+    def test_a_robot_that_drives_backwards(self) -> None:
+        """Its laser looks back to where it comes from: much of what it sees has no partner in the scan before."""
+        self.check_backwards("intel", 1.1, 0.085)
+        self.check_backwards("aces", 1.65, 0.085)
+        self.check_backwards("freiburg-079", 1.3, 0.12)
 
     def check_worse(self, log: str, told: Told, percent: float, deg_per_m: float) -> None:
         bag = recorded(log)

@@ -1,6 +1,7 @@
 // How pairs of points are weighed.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "matching/simulated_world.h"
@@ -45,6 +46,67 @@ TEST(AlignmentProblem, SurfacesThatAreTurnedAgainstEachOtherByMoreThanMostWeighL
     EXPECT_GT(turned, 20);
     EXPECT_GT(others, 60);
   }
+}
+
+// ---- what contradicts
+
+/// A square room, with a board of 1 m across the way ahead if asked for.
+World roomWithBoard(bool board) {
+  World world = closedPolygon({{-3.0, -3.0}, {3.0, -3.0}, {3.0, 3.0}, {-3.0, 3.0}});
+  if (board) world.push_back({{1.5, -0.5}, {1.5, 0.5}});
+  return world;
+}
+
+int pointsOnBoard(const PreparedScan& scan) {
+  return static_cast<int>(std::count_if(scan.points.point.begin(), scan.points.point.end(), [](const auto& p) {
+    return std::abs(p.x() - 1.5) < 0.01 && std::abs(p.y()) < 0.51;
+  }));
+}
+
+TEST(AlignmentProblem, WhatStandsWhereTheOtherScanLookedThroughContradicts) {
+  const auto without = scanOf(roomWithBoard(false));
+  const auto with = scanOf(roomWithBoard(true));
+  const int board = pointsOnBoard(*with);
+  ASSERT_GT(board, 30);
+  const AlignmentProblem came(*without, *with, SE2(), 0.2, PairOptions());
+  const AlignmentProblem left(*with, *without, SE2(), 0.2, PairOptions());
+  for (const AlignmentProblem* problem : {&came, &left}) {
+    EXPECT_NEAR(problem->contradictions(), board, 2);
+    const auto pairs = static_cast<double>(problem->pairs().size());
+    EXPECT_NEAR(problem->agreement(), pairs / (pairs + board), 0.01);
+  }
+}
+
+TEST(AlignmentProblem, WhatTheOtherScanCannotSeeDoesNotContradict) {
+  const World world = roomWithBoard(true);
+  const SimulatedLaser front = frontLaser();
+  const auto from = [&](const SE2& pose) {
+    return prepareScan(simulateScan(world, pose, front), front.base_from_laser, {});
+  };
+  const auto reference = from(SE2());
+  for (const SE2& place : {SE2(-1.5, 0.0, 0.0), SE2(-0.5, 1.0, 0.9), SE2(0.5, -1.5, -0.7)}) {  // back, and turned
+    const auto current = from(place);
+    const AlignmentProblem problem(*reference, *current, place, 0.2, PairOptions());
+    EXPECT_LT(problem.overlap(), 0.8) << place.vector().transpose();
+    EXPECT_GT(problem.agreement(), 0.98) << place.vector().transpose();
+  }
+}
+
+TEST(AlignmentProblem, WhatTheOtherScanCannotSeeCostsNoMoreThanWhatItSees) {
+  const World world = roomWithBoard(true);
+  const SimulatedLaser front = frontLaser();
+  const auto from = [&](const SE2& pose) {
+    return prepareScan(simulateScan(world, pose, front), front.base_from_laser, {});
+  };
+  const SE2 back(-1.0, 0.0, 0.0);
+  const auto reference = from(SE2());
+  const auto current = from(back);
+  const auto costAt = [&](const SE2& x) {
+    return AlignmentProblem(*reference, *current, x, 0.2, PairOptions()).cost(x) / static_cast<double>(current->size());
+  };
+  EXPECT_LT(costAt(back), 0.1);
+  EXPECT_GT(costAt(SE2()), 0.5) << "where more of the points have a partner, and more contradict";
+  EXPECT_GT(costAt(SE2(0.0, 0.0, M_PI)), 1.0) << "where there is nothing to compare";
 }
 
 }  // namespace

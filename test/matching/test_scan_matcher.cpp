@@ -404,7 +404,8 @@ TEST(RangeOffset, IsToldByHowScansFallTogether) {
 TEST(RangeOffset, WhatNoiseTellsOfItIsAllowedFor) {
   for (const double noise : {0.01, 0.02}) {
     const RangeOffsetEvidence none = rangeOffsetTold(0.0, noise);
-    EXPECT_NEAR(none.bias_std, 24.0 * noise * noise, 4.0 * noise * noise) << "of the noisier scan: 20 times its variance";
+    EXPECT_NEAR(none.bias_std, 24.0 * noise * noise, 4.0 * noise * noise)
+        << "of the noisier scan: 20 times its variance";
     EXPECT_LT(std::abs(none.value), 3.0 * none.bias_std + 2.0 / std::sqrt(none.information)) << "noise " << noise;
   }
 }
@@ -535,9 +536,64 @@ TEST(Failures, AnEstimateFarFromTheAlignmentDiverged) {
   EXPECT_EQ(match.failure, MatchFailure::kDiverged) << toString(match.failure);
 }
 
+TEST(Failures, ScansThatAgreeTooLittleContradictEachOther) {
+  const SimulatedLaser laser;
+  const World with_pillar = room();
+  const World without_pillar(with_pillar.begin(), with_pillar.end() - 4);
+  const auto reference = prepare(simulateScan(room(), SE2(), laser), laser);
+  const auto current = prepare(simulateScan(without_pillar, SE2(), laser), laser);
+  MatcherOptions options;
+  const Match match = ScanMatcher(options).match(*reference, *current, prediction(SE2()));
+  ASSERT_TRUE(match.displacement) << toString(match.failure);
+  EXPECT_GT(match.agreement, 0.8);
+  EXPECT_LT(match.agreement, 0.98);
+  options.min_agreement = match.agreement + 0.01;
+  const Match refused = ScanMatcher(options).match(*reference, *current, prediction(SE2()));
+  EXPECT_FALSE(refused.displacement);
+  EXPECT_EQ(refused.failure, MatchFailure::kContradiction) << toString(refused.failure);
+}
+
+// ---- a right prediction
+
+/// Along x, 2.4 m wide, with doors of 1 m that are set back by 12 cm on either side.
+World corridorWithDoors() {
+  World world;
+  for (const double side : {-1.0, 1.0}) {
+    for (int i = -12; i < 12; ++i) {
+      const double from = 2.7 * i + (side > 0.0 ? 0.0 : 0.9);
+      const double wall = 1.2 * side;
+      const double door = 1.32 * side;
+      world.push_back({{from, wall}, {from + 1.7, wall}});
+      world.push_back({{from + 1.7, wall}, {from + 1.7, door}});
+      world.push_back({{from + 1.7, door}, {from + 2.7, door}});
+      world.push_back({{from + 2.7, door}, {from + 2.7, wall}});
+    }
+  }
+  return world;
+}
+
+/// A laser that looks ahead sees walls beside the robot that it did not see before: a third of its points have no
+/// partner, and more would where it is not.
+TEST(RightPrediction, IsKeptWhereTheRobotDrivesBack) {
+  std::mt19937_64 random(5);
+  const World world = corridorWithDoors();
+  for (int i = 0; i < 20; ++i) {
+    const SE2 from(0.31 * i - 3.0, 0.1, 0.02);
+    const SE2 back(-1.0, 0.02, 0.05 - 0.005 * i);
+    const Match match = matchIn(world, from, back, frontLaser(), prediction(back, {0.03, -0.02, 0.02}), &random);
+    ASSERT_TRUE(match.displacement) << i << ": " << toString(match.failure);
+    EXPECT_LT(match.overlap, 0.75) << i;
+    EXPECT_GT(match.agreement, 0.95) << i;
+    const Eigen::Vector3d e = error(match.displacement->reference_from_current, back);
+    EXPECT_LT(std::abs(e.x()), 0.1) << i << ": " << e.transpose();
+    EXPECT_LT(std::abs(e.y()), 0.02) << i << ": " << e.transpose();
+    EXPECT_LT(std::abs(e.z()), 0.01) << i << ": " << e.transpose();
+  }
+}
+
 TEST(Failures, EveryReasonHasItsWords) {
-  for (const MatchFailure failure :
-       {MatchFailure::kTooFewPairs, MatchFailure::kNoOverlap, MatchFailure::kDiverged, MatchFailure::kNotObservable}) {
+  for (const MatchFailure failure : {MatchFailure::kTooFewPairs, MatchFailure::kNoOverlap, MatchFailure::kContradiction,
+                                     MatchFailure::kDiverged, MatchFailure::kNotObservable}) {
     EXPECT_NE(toString(failure), "unknown");
     EXPECT_NE(toString(failure), "none");
   }

@@ -22,7 +22,7 @@ std::shared_ptr<const PreparedScan> scanFrom(const World& world, const SE2& pose
 TEST(WideSearch, FindsThePlaceToAStep) {
   const auto reference = scanFrom(room(), SE2());
   for (const SE2& truth : {SE2(0.0, 0.0, 1.1), SE2(0.8, 0.1, -0.9), SE2(-0.7, -0.6, 0.5), SE2(0.9, 0.9, 0.0)}) {
-    const SE2 found = widelySearched(*reference, *scanFrom(room(), truth), SE2(), WideSearchOptions());
+    const SE2 found = widelySearched(*reference, *scanFrom(room(), truth), SE2(), WideSearchOptions()).front();
     const Eigen::Vector3d e = error(found, truth);
     EXPECT_LT(e.head<2>().norm(), 0.16) << truth.vector().transpose() << ": " << e.transpose();
     EXPECT_LT(std::abs(e.z()), 0.05) << truth.vector().transpose() << ": " << e.transpose();
@@ -31,8 +31,8 @@ TEST(WideSearch, FindsThePlaceToAStep) {
 
 TEST(WideSearch, WhereTheScansDoNotTellItStaysNearThePrediction) {
   const auto reference = scanFrom(corridor(), SE2());
-  const SE2 found = widelySearched(*reference, *scanFrom(corridor(), SE2(0.5, 0.2, 0.6)), SE2(0.3, 0.0, 0.0),
-                                   WideSearchOptions());
+  const SE2 truth(0.5, 0.2, 0.6);
+  const SE2 found = widelySearched(*reference, *scanFrom(corridor(), truth), SE2(0.3, 0.0, 0.0), {}).front();
   EXPECT_NEAR(found.x, 0.3, 0.25) << "along the corridor";
   EXPECT_NEAR(found.y, 0.2, 0.1);
   EXPECT_NEAR(found.yaw, 0.6, 0.05);
@@ -44,12 +44,13 @@ TEST(WideSearch, LooksNoFartherThanItsBounds) {
   WideSearchOptions options;
   options.translation = 0.4;
   options.yaw = 0.3;
-  const SE2 found = widelySearched(*reference, *current, SE2(0.1, 0.0, 0.1), options);
-  EXPECT_LE(std::abs(found.x - 0.1), 0.4 + 1e-9);
-  EXPECT_LE(std::abs(found.y), 0.4 + 1e-9);
-  EXPECT_LE(std::abs(found.yaw - 0.1), 0.3 + 1e-9);
+  for (const SE2& found : widelySearched(*reference, *current, SE2(0.1, 0.0, 0.1), options)) {
+    EXPECT_LE(std::abs(found.x - 0.1), 0.4 + 1e-9);
+    EXPECT_LE(std::abs(found.y), 0.4 + 1e-9);
+    EXPECT_LE(std::abs(found.yaw - 0.1), 0.3 + 1e-9);
+  }
   options.translation = 0.0;
-  EXPECT_EQ(widelySearched(*reference, *current, SE2(0.1, 0.0, 0.1), options).x, 0.1);
+  EXPECT_EQ(widelySearched(*reference, *current, SE2(0.1, 0.0, 0.1), options).front().x, 0.1);
 }
 
 /// What the wheels say that stood still while the robot turned.
@@ -70,19 +71,56 @@ TEST(WideSearch, FindsATurnThatTheWheelsDidNotTell) {
       << "found without it";
 }
 
-/// A few points that lie well on each other, near enough to the prediction, are not match enough to be left alone.
-TEST(WideSearch, BeginsWhereTooFewPointsHaveAPartner) {
+/// A square room looks nearly alike turned by a quarter; what stands in it tells.
+TEST(WideSearch, TellsASquareRoomFromItselfTurned) {
+  World world = closedPolygon({{-3.0, -3.0}, {3.0, -3.0}, {3.0, 3.0}, {-3.0, 3.0}});
+  world.push_back({{1.2, 0.4}, {2.0, 1.6}});
+  const auto reference = scanFrom(world, SE2());
+  for (const SE2& truth : {SE2(0.3, 0.1, 0.95), SE2(0.1, -0.3, -0.95)}) {
+    const auto current = scanFrom(world, truth);
+    const std::vector<SE2> places = widelySearched(*reference, *current, SE2(), WideSearchOptions());
+    ASSERT_GE(places.size(), 2U);
+    EXPECT_LE(places.size(), 3U);
+    const Match match = ScanMatcher(MatcherOptions()).match(*reference, *current, frozen());
+    ASSERT_TRUE(match.displacement) << toString(match.failure);
+    const Eigen::Vector3d e = error(match.displacement->reference_from_current, truth);
+    EXPECT_LT(e.cwiseAbs().maxCoeff(), 0.03) << e.transpose();
+    EXPECT_GT(match.agreement, 0.95);
+  }
+}
+
+/// Where the scans contradict each other, near enough to the prediction, the match is not left alone.
+TEST(WideSearch, BeginsWhereTheScansContradictEachOther) {
   const SE2 truth(0.9, -0.5, -0.8);
   const DisplacementPrediction vague{SE2(), 0.3 * 0.3 * Eigen::Matrix3d::Identity()};
-  const auto offWith = [&](double below_overlap) {
+  const auto offWith = [&](double below_agreement) {
     MatcherOptions options;
-    options.wide_search_below_overlap = below_overlap;
+    options.min_agreement = 0.0;
+    options.search_yaw_steps = 0;
+    options.wide_search_below_agreement = below_agreement;
     const Match match = ScanMatcher(options).match(*scanFrom(room(), SE2()), *scanFrom(room(), truth), vague);
     EXPECT_TRUE(match.displacement) << toString(match.failure);
     return match.displacement ? error(match.displacement->reference_from_current, truth).norm() : 1e9;
   };
-  EXPECT_LT(offWith(0.5), 0.02);
+  EXPECT_LT(offWith(0.7), 0.02);
   EXPECT_GT(offWith(0.0), 0.3);
+}
+
+/// Whatever the bounds are in cells, of which it takes several at a time.
+TEST(WideSearch, ReachesItsBounds) {
+  const auto reference = scanFrom(room(), SE2());
+  for (const double bound : {0.3, 0.45, 0.5, 0.65, 0.75}) {
+    WideSearchOptions options;
+    options.translation = bound;
+    const double reached = 0.1 * std::floor(bound / 0.1 + 1e-9);
+    for (const double sign : {-1.0, 1.0}) {
+      const SE2 truth(sign * reached, -sign * reached, 0.3);
+      const SE2 found = widelySearched(*reference, *scanFrom(room(), truth), SE2(), options).front();
+      EXPECT_NEAR(found.x, truth.x, 0.11) << bound;
+      EXPECT_NEAR(found.y, truth.y, 0.11) << bound;
+      EXPECT_NEAR(found.yaw, truth.yaw, 0.07) << bound;
+    }
+  }
 }
 
 }  // namespace

@@ -395,10 +395,10 @@ TEST(ScanOdometryFaults, ScansThatAreNotTrustedOnSlipAreGated) {
 /// A slip is believed only of scans that match well.
 TEST(ScanOdometryFaults, APoorMatchIsNoSlip) {
   const SimulatedDrive drive = slippingDrive();
-  for (const bool by_overlap : {true, false}) {
+  for (const bool by_agreement : {true, false}) {
     PipelineOptions options;
-    if (by_overlap) {
-      options.gate.slip_min_overlap = 1.1;
+    if (by_agreement) {
+      options.gate.slip_min_agreement = 1.1;
     } else {
       options.gate.slip_max_residual = 1e-3;
     }

@@ -30,7 +30,7 @@ COLUMNS = ("stamp,x,y,yaw,var_x,cov_xy,cov_xyaw,var_y,cov_yyaw,var_yaw,"
            "displacement_var_x,displacement_cov_xy,displacement_cov_xyaw,displacement_var_y,displacement_cov_yyaw,"
            "displacement_var_yaw,innovation_1,innovation_2,innovation_3,nis,"
            "normalised_x,normalised_y,normalised_yaw,"
-           "pairs,overlap,residual_rms,new_reference,outcome,reason").split(",")
+           "pairs,overlap,agreement,residual_rms,new_reference,outcome,reason").split(",")
 
 
 class ReplayTest(unittest.TestCase):
@@ -152,6 +152,7 @@ class ReplayTest(unittest.TestCase):
             self.assertGreaterEqual(float(row["nis"]), max(squares) * (1 - 1e-6))  # any direction has its share of it
             self.assertGreater(int(row["pairs"]), 100)
             self.assertTrue(0.5 < float(row["overlap"]) <= 1.0, row["overlap"])
+            self.assertTrue(0.9 < float(row["agreement"]) <= 1.0, row["agreement"])
             for name in COLUMNS[11:28]:
                 self.assertTrue(math.isfinite(float(row[name])), name)
 

@@ -92,6 +92,13 @@ class AlignmentProblem {
   /// Share of the points of the current scan that have a partner.
   double overlap() const;
 
+  /// Points of either scan without a partner that lie where the other scan has seen that nothing is.
+  int contradictions() const;
+
+  /// Share of the points with a partner among these and the contradictions: 1 where all that differs is what one of the
+  /// scans cannot see. Where they do not belong together it is about a half.
+  double agreement() const;
+
   ResidualTerms terms(const Residual& residual, const RigidMotion& reference_from_current) const;
 
   /// ∂A by the angle of the residual's normal.
@@ -99,7 +106,8 @@ class AlignmentProblem {
 
   NormalEquations normalEquations(const SE2& reference_from_current) const;
 
-  /// Loss of the whole current scan, a point without a partner at a fixed price: compares alignments with each other.
+  /// Loss of the whole current scan: compares alignments with each other. A contradiction has a fixed price; what the
+  /// other scan cannot see counts as the average of what it can, as otherwise places would be preferred that it sees.
   double cost(const SE2& reference_from_current) const;
 
  private:
@@ -110,6 +118,7 @@ class AlignmentProblem {
 
   const PreparedScan& reference_;
   const PreparedScan& current_;
+  SE2 paired_at_;
   std::vector<Pair> pairs_;
   std::vector<Residual> residuals_;
   RobustKernel kernel_;

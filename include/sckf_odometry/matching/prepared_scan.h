@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "sckf_odometry/matching/free_space.h"
 #include "sckf_odometry/matching/laser_scan.h"
 #include "sckf_odometry/matching/scan_motion.h"
 #include "sckf_odometry/matching/surface.h"
@@ -36,6 +37,7 @@ struct PreparedScan {
   ScannedPoints points;                    ///< the readings
   std::vector<Surface> surface;            ///< the surface around each point
   mrpt::maps::CSimplePointsMap map;        ///< the same points, for CICP and for nearest neighbours
+  FreeSpace free_space;                    ///< what the laser looked through
   std::vector<Eigen::Vector2d> set_aside;  ///< what else the laser has seen: points that are not to be matched
 
   std::size_t size() const { return points.size(); }

@@ -15,18 +15,19 @@ namespace sckf {
 
 /// How the displacement is searched for.
 struct MatcherOptions {
-  double icp_pair_distance = 0.5;          ///< [m] CICP pairs points up to this distance at its start
-  int max_iterations = 15;                 ///< of the alignment after CICP
-  bool both_ways = true;                   ///< match the reference with the current scan, too, and take the mean
-  double prior_std_translation = 0.05;     ///< [m] added to the prediction's std of x and y, for the pairing of points
-  double prior_std_yaw = 0.05;             ///< [rad] … and to its std of yaw
-  double search_below_overlap = 0.7;       ///< more start yaws are tried if a smaller share of the points has a partner
-  double search_yaw_step = 0.12;           ///< [rad] between the start yaws
-  int search_yaw_steps = 4;                ///< start yaws to either side of the prediction
-  double wide_search_below_overlap = 0.5;  ///< if still fewer have one, wherever the scans may fall together
+  double icp_pair_distance = 0.5;       ///< [m] CICP, if needed, pairs points up to this distance at its start
+  int max_iterations = 15;              ///< of an alignment
+  bool both_ways = true;                ///< match the reference with the current scan, too, and take the mean
+  double prior_std_translation = 0.05;  ///< [m] added to the prediction's std of x and y, for the pairing of points
+  double prior_std_yaw = 0.05;          ///< [rad] … and to its std of yaw
+  double search_below_agreement = 0.8;  ///< more starts are tried if the scans contradict each other by more
+  double search_yaw_step = 0.12;        ///< [rad] between the start yaws
+  int search_yaw_steps = 4;             ///< start yaws to either side of the prediction
+  double wide_search_below_agreement = 0.7;  ///< if they still do, wherever the scans may fall together
   WideSearchOptions wide_search;
-  int min_pairs = 20;           ///< fewer points with a partner are "too few pairs"
+  int min_pairs = 10;           ///< fewer points with a partner are "too few pairs"
   double min_overlap = 0.1;     ///< a smaller share of the points with a partner is "no overlap"
+  double min_agreement = 0.6;   ///< less agreement of the scans is a contradiction, and no match
   double max_refinement = 0.5;  ///< [m, rad] a larger correction of the aligned pose by the estimate is "diverged"
   PairOptions pairs;
   EstimationOptions estimation;
@@ -36,6 +37,7 @@ enum class MatchFailure {
   kNone,
   kTooFewPairs,    ///< hardly any point of one scan has a partner in the other
   kNoOverlap,      ///< too small a share of the points has a partner
+  kContradiction,  ///< too many points of one scan are where the other has seen that nothing is
   kDiverged,       ///< the estimate ran away from the aligned pose
   kNotObservable,  ///< the scans see no direction of the displacement
 };
@@ -46,8 +48,9 @@ std::string toString(MatchFailure failure);
 struct Match {
   std::optional<Displacement> displacement;  ///< empty if and only if failure is not kNone
   MatchFailure failure = MatchFailure::kNone;
-  std::vector<Pair> pairs;    ///< at the aligned pose
-  double overlap = 0.0;       ///< share of the points of the current scan that have a partner, 0 to 1
+  std::vector<Pair> pairs;  ///< at the aligned pose
+  double overlap = 0.0;     ///< share of the points of the current scan that have a partner, 0 to 1
+  double agreement = 0.0;   ///< AlignmentProblem::agreement(), 0 to 1
   RangeOffsetEvidence range_offset;
   double residual_rms = 0.0;  ///< of the weighted residuals: 1 where the noise explains them
 };

@@ -2,20 +2,23 @@
 // 2009) of points.
 #pragma once
 
+#include <vector>
+
 #include "sckf_odometry/core/se2.h"
 #include "sckf_odometry/matching/prepared_scan.h"
 
 namespace sckf {
 
 struct WideSearchOptions {
-  double yaw = 1.2;          ///< [rad] to either side of the prediction; 0: no such search
-  double translation = 1.0;  ///< [m] ahead, behind and to either side of it
+  double yaw = 1.6;          ///< [rad] to either side of the prediction; 0: no such search
+  double translation = 1.5;  ///< [m] ahead, behind and to either side of it
 };
 
-/// Of all displacements in steps of 10 cm and 2.3° about the predicted one, that at which most points of the current
-/// scan lie near points of the reference. Where the scans hardly tell, it is near the prediction. Good to about such a
-/// step, as the start of an alignment.
-SE2 widelySearched(const PreparedScan& reference, const PreparedScan& current, const SE2& predicted,
-                   const WideSearchOptions& options);
+/// Of all displacements in steps of 10 cm and 2.3° about the predicted one, those at which most points of the current
+/// scan lie near points of the reference: up to three that are turned against each other, as a room with square corners
+/// looks alike, the best first. Where the scans hardly tell, they are near the prediction. Good to about such a step,
+/// as the start of an alignment.
+std::vector<SE2> widelySearched(const PreparedScan& reference, const PreparedScan& current, const SE2& predicted,
+                                const WideSearchOptions& options);
 
 }  // namespace sckf

@@ -1,0 +1,32 @@
+#include "sckf_odometry/matching/free_space.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sckf {
+
+FreeSpace::FreeSpace(const LaserScan& scan, const Eigen::Isometry3d& base_from_laser, const ScannedPoints& points,
+                     double margin)
+    : origin_(base_from_laser.translation().head<2>()), square_reach_(scan.ranges.size(), 0.0) {
+  const Eigen::Matrix3d& C = base_from_laser.linear();
+  const double sense = C(2, 2) < 0.0 ? -1.0 : 1.0;  // upside down, beams go round the other way
+  first_bearing_ = std::atan2(C(1, 0), C(0, 0)) + sense * scan.angle_min;
+  increment_ = sense * scan.angle_increment;
+  for (std::size_t i = 1; i + 1 < points.size(); ++i) {
+    if (points.beam[i + 1] - points.beam[i - 1] != 2) continue;
+    const double reach = std::min({points.range[i - 1], points.range[i], points.range[i + 1]}) - margin;
+    if (reach > 0.0) square_reach_[static_cast<std::size_t>(points.beam[i])] = reach * reach;
+  }
+}
+
+bool FreeSpace::contains(const Eigen::Vector2d& point) const {
+  const Eigen::Vector2d d = point - origin_;
+  const double turn = std::atan2(d.y(), d.x()) - first_bearing_;
+  const double beams_in_a_turn = 2.0 * M_PI / std::abs(increment_);
+  double beam = std::round(turn / increment_);
+  beam -= beams_in_a_turn * std::floor((beam + 0.5) / beams_in_a_turn);
+  const auto k = static_cast<std::size_t>(std::lround(beam));
+  return k < square_reach_.size() && d.squaredNorm() < square_reach_[k];
+}
+
+}  // namespace sckf
