@@ -251,6 +251,13 @@ void MultiCloneFilter::forget(std::size_t clone) {
   clones_.erase(clones_.begin() + static_cast<std::ptrdiff_t>(clone));
 }
 
+void MultiCloneFilter::loosen(const Matrix3d& covariance) {
+  Matrix3d G;
+  compose(pose_, SE2(), nullptr, &G);
+  const Matrix3d W = inverseOfAdditive(pose_) * G;
+  errors_.disturb(pose_error_, symmetric(W * covariance * W.transpose()));
+}
+
 // ---- other measurements
 
 double MultiCloneFilter::update(const PoseMeasurement& measured, double nis_bound) {

@@ -30,6 +30,11 @@ void MapFilter::age(double dt) {
   if (map_) map_->age(dt);
 }
 
+void MapFilter::loosen(const Eigen::Matrix3d& covariance) {
+  odom_->loosen(covariance);
+  if (map_) map_->loosen(covariance);
+}
+
 void MapFilter::beginScan() {
   odom_->beginScan();
   if (map_) map_->beginScan();

@@ -1,7 +1,9 @@
 // How a scan corrects the estimate: by displacements from references, by landmarks, by a heading.
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <sstream>
 
+#include "sckf_odometry/core/covariance.h"
 #include "sckf_odometry/pipeline/chi_squared.h"
 #include "sckf_odometry/pipeline/scan_odometry.h"
 #include "sckf_odometry/pipeline/stopwatch.h"
@@ -97,6 +99,18 @@ void ScanOdometry::compareWithOlderReferences(ScanReport& report) {
     filter_->update(displacement, innovation);
     ++report.older_references;
   }
+}
+
+/// What matches err by beyond range noise is partly the same from reference to reference, as the same surfaces are
+/// taken wrong in each: it adds up faster than errors that have nothing in common.
+void ScanOdometry::allowForCommonErrors(const ScanReport& report) {
+  if (!wasUsed(report.outcome) || !report.match.displacement) return;
+  const Displacement& z = *report.match.displacement;
+  const Displacement::MatrixDD V_square = z.observable * z.observable.transpose();
+  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3> seen =
+      z.observable.transpose() * V_square.inverse();  // V_oᵀ · seen = I
+  seen.topRows<2>() = (z.reference_from_current.rotation().transpose() * seen.topRows<2>()).eval();
+  filter_->loosen(options_.reference.matching_common * symmetric(seen * z.matching_noise * seen.transpose()));
 }
 
 /// Another laser may have corrected the estimate just now, by a displacement whose covariance has tails.

@@ -163,6 +163,7 @@ List estimationParameters(PipelineOptions& pipeline) {
       number("older_dist_linear", reference.older_dist_linear, aboveUpTo(0.0, 1000.0), "m"),
       number("older_dist_angular", reference.older_dist_angular, aboveUpTo(0.0, 100.0), "rad"),
       number("older_min_overlap", reference.older_min_overlap, within(0.0, 1.0)),
+      number("matching_common", reference.matching_common, within(0.0, 1000.0)),
       number("older_std_translation", reference.older_std_translation, within(0.0, 100.0), "m"),
       number("older_inflation", reference.older_inflation, within(1.0, 1000.0)),
       number("older_std_yaw", reference.older_std_yaw, within(0.0, 100.0), "rad"),

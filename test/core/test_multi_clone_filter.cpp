@@ -162,6 +162,11 @@ TEST(MultiCloneFilter, IsTheDenseFilterAtEveryStep) {
         EXPECT_TRUE(matricesNear(filter.pose().vector(), dense.poses()[0].vector(), 1e-8));
         EXPECT_TRUE(matricesClose(filter.covariance(), dense.covariance(), 1e-8));
       }
+      if (random.uniform(0.0, 1.0) < 0.5) {
+        const Matrix3d Q = random.covariance(3, 0.01);
+        filter.loosen(Q);
+        dense.propagate({SE2(), Q});
+      }
       filter.clone(R);
       dense.clone();
       if (dense.clones() > 4) {

@@ -1,6 +1,9 @@
 // Rooms of straight walls and a laser in them: those of the experiments.
 #pragma once
 
+#include <algorithm>
+#include <random>
+
 #include "sckf_odometry/experiments/simulated_world.h"
 
 namespace sckf::test {
@@ -16,5 +19,25 @@ using sckf::simulateScan;
 using sckf::simulateSweep;
 using sckf::Wall;
 using sckf::World;
+
+/// Walls of plaster and shelves: steps of some centimetres every few centimetres.
+inline World rough(const World& smooth, double roughness) {
+  constexpr double kStep = 0.1;  // [m]
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> gauss(0.0, roughness);
+  World world;
+  for (const Wall& wall : smooth) {
+    const Eigen::Vector2d way = wall.to - wall.from;
+    const Eigen::Vector2d across = quarterTurn(way.normalized());
+    const int steps = std::max(1, static_cast<int>(way.norm() / kStep));
+    Eigen::Vector2d from = wall.from;
+    for (int i = 1; i <= steps; ++i) {
+      const Eigen::Vector2d to = wall.from + way * i / steps + gauss(random) * across;
+      world.push_back({from, to});
+      from = to;
+    }
+  }
+  return world;
+}
 
 }  // namespace sckf::test

@@ -281,26 +281,6 @@ TEST(BothWays, HalfOfWhatTheyDifferByIsNoise) {
   EXPECT_LT((mean.matching_noise - expected).norm(), 1e-12) << mean.matching_noise << "\nexpected\n" << expected;
 }
 
-/// Walls of plaster and shelves: steps of some centimetres every few centimetres.
-World rough(const World& smooth, double roughness) {
-  constexpr double kStep = 0.1;  // [m]
-  std::mt19937_64 random(3);
-  std::normal_distribution<double> gauss(0.0, roughness);
-  World world;
-  for (const Wall& wall : smooth) {
-    const Eigen::Vector2d way = wall.to - wall.from;
-    const Eigen::Vector2d across = quarterTurn(way.normalized());
-    const int steps = std::max(1, static_cast<int>(way.norm() / kStep));
-    Eigen::Vector2d from = wall.from;
-    for (int i = 1; i <= steps; ++i) {
-      const Eigen::Vector2d to = wall.from + way * i / steps + gauss(random) * across;
-      world.push_back({from, to});
-      from = to;
-    }
-  }
-  return world;
-}
-
 /// Slanting walls as stairs, as a grid map has them: what beams on one step err by they err by together.
 World stairs(const World& smooth, double step) {
   const auto cornerOf = [step](const Eigen::Vector2d& p) -> Eigen::Vector2d {

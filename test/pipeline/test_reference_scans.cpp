@@ -148,5 +148,31 @@ TEST(ScanOdometry, WhatDisplacementsHaveInCommonIsAllowedFor) {
   EXPECT_GT(grown[1], 1.5 * grown[0]) << "variance of yaw, with " << grown[1] << ", without " << grown[0] << " rad²";
 }
 
+/// By how much larger the variance of y is after a drive when so much of the matching noise is common.
+double grownByWhatIsCommon(const World& world) {
+  const SimulatedDrive drive(Wheels(), 11000, world);
+  double variance[2];
+  for (const bool common : {false, true}) {
+    PipelineOptions options;
+    options.reference.older_compared = 0;
+    options.reference.matching_common = common ? 1.0 : 0.0;
+    Driven driven(drive, options);
+    driven.odometry(0);
+    driven.run(0, 10000);
+    variance[common ? 1 : 0] = driven.reports.back().estimate->covariance(1, 1);
+  }
+  return variance[1] / variance[0];
+}
+
+/// It is for what walls make a match err by, not for the noise of ranges, whose correlations are known.
+TEST(ScanOdometry, WhatMatchesOneAfterTheOtherErrByAlikeAddsUp) {
+  const double among_rough_walls = grownByWhatIsCommon(rough(room(), 0.08));
+  const double among_smooth_walls = grownByWhatIsCommon(room());
+  EXPECT_GT(among_rough_walls, 1.3);
+  EXPECT_LT(among_rough_walls, 2.1);
+  EXPECT_LT(among_smooth_walls, 1.2);
+  EXPECT_GE(among_smooth_walls, 1.0);
+}
+
 }  // namespace
 }  // namespace sckf::test

@@ -114,6 +114,10 @@ class FusionMethod {
   }
   virtual void forget(std::size_t /*clone*/) {}
 
+  /// The pose errs by this covariance (in base_link) more than measurements tell, before its scan becomes a reference.
+  /// Methods that know of no such error leave it aside.
+  virtual void loosen(const Eigen::Matrix3d& /*covariance*/) {}
+
   /// The present scan becomes the reference. range_variances (M): the diagonal of its R [m²].
   virtual void clone(const Eigen::VectorXd& range_variances) = 0;
 };

@@ -40,6 +40,7 @@ class MultiCloneFilter : public LandmarkStates {
   void update(const Displacement& displacement, const Innovation& innovation) override;
   void clone(const Eigen::VectorXd& range_variances) override;
   void forget(std::size_t clone) override;
+  void loosen(const Eigen::Matrix3d& covariance) override;
 
   /// Measurements that are no displacements (V-A): all states are corrected, unless the innovation, normalised and
   /// squared, exceeds a bound. Returns it.

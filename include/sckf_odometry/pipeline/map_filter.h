@@ -58,6 +58,7 @@ class MapFilter : public LandmarkStates {
   double updateHeading(double yaw, double variance, double nis_bound) override;
   void clone(const Eigen::VectorXd& range_variances) override;
   void forget(std::size_t clone) override;
+  void loosen(const Eigen::Matrix3d& covariance) override;
   void addLandmark(const Sighting& sighting) override;
   void forgetLandmark(std::size_t number) override;
   void update(std::size_t landmark, const Sighting& sighting) override;

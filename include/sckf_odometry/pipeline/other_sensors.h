@@ -14,8 +14,8 @@ struct CalibrationOptions {
   bool on = false;                       ///< there are others …
   double rotation_std = 0.05;            ///< … that of a rotation, as large …
   double rotation_per_meter_std = 0.05;  ///< [rad/m] … the rotation that goes with the way …
-  double laser_ahead_std = 0.1;          ///< [m] … and how much farther ahead the laser is of where the wheels turn about
-  double way = 1000.0;                   ///< [m] within which they are forgotten
+  double laser_ahead_std = 0.1;  ///< [m] … and how much farther ahead the laser is of where the wheels turn about
+  double way = 1000.0;           ///< [m] within which they are forgotten
 };
 
 /// What an IMU is used for, and how far it is trusted.

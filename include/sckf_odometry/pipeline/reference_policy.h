@@ -15,12 +15,13 @@ struct ReferenceOptions {
   int kf_max_failures = 2;       ///< so does this many scans in a row that gave no displacement
 
   // A scan that becomes a reference is compared with older ones too, where the method keeps more than one.
-  int kept = 16;                        ///< references, the newest among them
-  int older_compared = 3;               ///< so many older ones: the one before the newest, then the nearest …
-  double older_dist_linear = 3.0;       ///< [m] … not farther away than this …
-  double older_dist_angular = 1.5;      ///< [rad] … nor turned more …
-  double older_min_overlap = 0.3;       ///< … nor with a smaller share of points with a partner
-  double older_inflation = 8.0;         ///< of a displacement's covariance: it errs in part as the others of its scan
+  int kept = 16;                    ///< references, the newest among them
+  int older_compared = 3;           ///< so many older ones: the one before the newest, then the nearest …
+  double older_dist_linear = 3.0;   ///< [m] … not farther away than this …
+  double older_dist_angular = 1.5;  ///< [rad] … nor turned more …
+  double older_min_overlap = 0.3;   ///< … nor with a smaller share of points with a partner
+  double older_inflation = 8.0;     ///< of a displacement's covariance: it errs in part as the others of its scan
+  double matching_common = 1.0;     ///< of a displacement's matching noise: so much more the next ones have in common
   double older_std_translation = 0.03;  ///< [m] what the estimate may be off from an older reference, beyond its
   double older_std_yaw = 0.01;          ///< [rad] … covariance, times the root of the references in between
 };

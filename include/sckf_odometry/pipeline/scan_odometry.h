@@ -125,6 +125,7 @@ class ScanOdometry {
   bool fuse(ScanReport& report);
   void followSlip(const Displacement& displacement);
   void compareWithOlderReferences(ScanReport& report);
+  void allowForCommonErrors(const ScanReport& report);
   Displacement::MatrixDD slackAmongLasers(const Displacement& displacement) const;
   LandmarkStates* landmarkFilter() const;  ///< null where landmarks are not used
   void claimLandmarks(ScanReport& report);
