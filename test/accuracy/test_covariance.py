@@ -73,16 +73,16 @@ class WindowsTest(OnLogs):
     PATTERN = r"NEES at their ends, median (\S+) .*inside 3 sigma: x (\S+), y (\S+), yaw (\S+) "
 
     def test_intel(self) -> None:
-        self.check_recorded("intel", Found(4.0, 0.92))
+        self.check_recorded("intel", Found(2.1, 0.945))
 
     def test_aces(self) -> None:
-        self.check_recorded("aces", Found(4.0, 0.96))
+        self.check_recorded("aces", Found(2.3, 0.98))
 
     def test_freiburg_079(self) -> None:
-        self.check_recorded("freiburg-079", Found(9.0, 0.81))
+        self.check_recorded("freiburg-079", Found(5.3, 0.87))
 
     def test_simulated_log_of_mrpt(self) -> None:
-        self.check_simulated(Found(6.5, 0.94))
+        self.check_simulated(Found(3.8, 0.97))
 
 
 if __name__ == "__main__":
