@@ -58,7 +58,7 @@ class Search {
   static constexpr double kRough = 2.0;      // residuals of twice what noise explains
   static constexpr double kSurprise = 16.0;  // four sigma from the prior
   static constexpr double kGain = 0.3;       // of the points' cost, for each: for less the prior is not given up
-  static constexpr double kAgreesBetter = 0.05;
+  static constexpr double kAgreesBetter = 0.05;  // for less one place far from the prior is not left for another
 
   static Eigen::Matrix3d priorFloor(const MatcherOptions& options) {
     return Eigen::Vector3d(options.prior_std_translation, options.prior_std_translation, options.prior_std_yaw)
