@@ -35,4 +35,15 @@ std::string problemOf(const SE2& pose, const Eigen::Matrix3d& covariance) {
   return problem.str();
 }
 
+Eigen::MatrixXd carriedOver(const Eigen::MatrixXd& J, const Eigen::VectorXd& variances) {
+  // Entry by entry: a matrix product of so few rows spends its time on anything but multiplying.
+  Eigen::MatrixXd P(J.rows(), J.rows());
+  for (Eigen::Index i = 0; i < J.rows(); ++i) {
+    for (Eigen::Index k = 0; k <= i; ++k) {
+      P(i, k) = P(k, i) = (J.row(i).array() * variances.transpose().array() * J.row(k).array()).sum();
+    }
+  }
+  return P;
+}
+
 }  // namespace sckf

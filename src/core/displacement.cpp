@@ -1,10 +1,11 @@
 #include "sckf_odometry/core/displacement.h"
 
+#include "sckf_odometry/core/covariance.h"
+
 namespace sckf {
 
 Displacement::MatrixDD Displacement::covariance() const {
-  return J_reference * variance_reference.asDiagonal() * J_reference.transpose() +
-         J_current * variance_current.asDiagonal() * J_current.transpose() + matching_noise;
+  return carriedOver(J_reference, variance_reference) + carriedOver(J_current, variance_current) + matching_noise;
 }
 
 }  // namespace sckf

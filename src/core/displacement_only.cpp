@@ -2,6 +2,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "sckf_odometry/core/covariance.h"
+
 namespace sckf {
 
 namespace {
@@ -58,7 +60,7 @@ Innovation DisplacementOnly::innovation(const Displacement& z) const {
   r.residual = z.observable * error(z.reference_from_current, displacement_);
   r.H_clone = z.observable * H_k;
   r.H_pose = z.observable * H;
-  r.noise = z.J_current * z.variance_current.asDiagonal() * z.J_current.transpose() + z.matching_noise;
+  r.noise = carriedOver(z.J_current, z.variance_current) + z.matching_noise;
   r.covariance = covariance_.residual(measurement(z));
   r.gain =
       H.transpose() * replacement(z.observable, covariance_.displacement());  // Γ K: H is a rotation, Γ its inverse

@@ -54,7 +54,7 @@ JointCovariance::Projected JointCovariance::project(const Eigen::MatrixXd& J_ref
   P << P_kk_, P_kX_, P_ks,                 //
       P_kX_.transpose(), P_XX_, P_Xs,      //
       P_ks.transpose(), P_Xs.transpose(),  //
-      J_reference * R_k_.asDiagonal() * J_reference.transpose();
+      carriedOver(J_reference, R_k_);
   return P;
 }
 

@@ -1,7 +1,5 @@
 #include "sckf_odometry/matching/alignment_problem.h"
 
-#include <mrpt/poses/CPose2D.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -14,21 +12,6 @@ double square(double v) { return v * v; }
 
 /// From a to b, both of length 1: the sine.
 double turnBetween(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return quarterTurn(a).dot(b); }
-
-/// The points of the current scan with their nearest neighbours in the reference, by MRPT's k-d tree.
-mrpt::tfest::TMatchingPairList nearestNeighbours(const PreparedScan& reference, const PreparedScan& current,
-                                                 const SE2& reference_from_current, double max_distance) {
-  mrpt::maps::TMatchingParams params;
-  params.maxDistForCorrespondence = static_cast<float>(max_distance);
-  params.maxAngularDistForCorrespondence = 0.0F;
-  mrpt::tfest::TMatchingPairList list;
-  mrpt::maps::TMatchingExtraResults extra;
-  const mrpt::poses::CPose2D pose(reference_from_current.x, reference_from_current.y, reference_from_current.yaw);
-  reference.map.determineMatching2D(&current.map,
-                                    {reference_from_current.x, reference_from_current.y, reference_from_current.yaw},
-                                    list, params, extra);
-  return list;
-}
 
 /// From point i to the nearer of its neighbours in the order of the beams.
 Eigen::Vector2d toNextPoint(const ScannedPoints& points, std::size_t i) {
@@ -43,14 +26,21 @@ Eigen::Vector2d toNextPoint(const ScannedPoints& points, std::size_t i) {
 
 AlignmentProblem::AlignmentProblem(const PreparedScan& reference, const PreparedScan& current,
                                    const SE2& reference_from_current, double max_distance, const PairOptions& options)
+    : AlignmentProblem(reference, current, reference_from_current,
+                       NearestNeighbours(reference, current).pairs(RigidMotion(reference_from_current), max_distance),
+                       options) {}
+
+AlignmentProblem::AlignmentProblem(const PreparedScan& reference, const PreparedScan& current,
+                                   const SE2& reference_from_current, const std::vector<Pair>& neighbours,
+                                   const PairOptions& options)
     : reference_(reference), current_(current), paired_at_(reference_from_current) {
   const RigidMotion motion(reference_from_current);
-  for (const auto& match : nearestNeighbours(reference, current, reference_from_current, max_distance)) {
-    const Pair pair{static_cast<int>(match.globalIdx), static_cast<int>(match.localIdx)};
-    const bool on_surface = reference.surface[match.globalIdx].valid();
-    if (on_surface) {
+  pairs_.reserve(neighbours.size());
+  residuals_.reserve(2 * neighbours.size());
+  for (const Pair& pair : neighbours) {
+    if (reference_.surface[static_cast<std::size_t>(pair.reference)].valid()) {
       addSurfacePair(pair, motion, options);
-    } else if (!current.surface[match.localIdx].valid()) {
+    } else if (!current_.surface[static_cast<std::size_t>(pair.current)].valid()) {
       addPointPair(pair, options);
     }
   }
@@ -107,7 +97,7 @@ void AlignmentProblem::weighByTurn(const RigidMotion& reference_from_current, co
   std::nth_element(turns.begin(), middle, turns.end());
   const double median = middle->first;
   for (const auto& [turn, residual] : turns)
-    residual->std *= std::hypot(1.0, (turn - median) / options.normal_agreement);
+    residual->std *= std::sqrt(1.0 + square((turn - median) / options.normal_agreement));
 }
 
 void AlignmentProblem::fitKernel(const RigidMotion& reference_from_current, const PairOptions& options) {
@@ -155,16 +145,6 @@ double AlignmentProblem::agreement() const {
   return paired / std::max(1.0, paired + contradictions());
 }
 
-ResidualTerms AlignmentProblem::terms(const Residual& residual, const RigidMotion& reference_from_current) const {
-  ResidualTerms terms;
-  terms.lever = reference_from_current.C * current_.points.point[static_cast<std::size_t>(residual.current)];
-  terms.offset = terms.lever + reference_from_current.t - residual.anchor;
-  terms.e = residual.normal.dot(terms.offset) / residual.std;
-  terms.A << residual.normal, residual.normal.dot(quarterTurn(terms.lever));
-  terms.A /= residual.std;
-  return terms;
-}
-
 NormalEquations AlignmentProblem::normalEquations(const SE2& reference_from_current) const {
   NormalEquations equations;
   const RigidMotion motion(reference_from_current);
@@ -182,13 +162,6 @@ NormalEquations AlignmentProblem::normalEquations(const SE2& reference_from_curr
   }
   equations.lever = std::sqrt(lever_square_sum / static_cast<double>(residuals_.size()));
   return equations;
-}
-
-Eigen::Vector3d AlignmentProblem::derivativeByNormal(const Residual& residual, const ResidualTerms& t) {
-  const Eigen::Vector2d tangent = quarterTurn(residual.normal);
-  Eigen::Vector3d dA;
-  dA << tangent, tangent.dot(quarterTurn(t.lever));
-  return dA / residual.std;
 }
 
 double AlignmentProblem::cost(const SE2& reference_from_current) const {

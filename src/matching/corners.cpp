@@ -131,10 +131,11 @@ class CornerSearch {
   /// both.
   void addDerivatives(const Surface& wall, const Eigen::Vector2d& meet_by_offset, Corner& corner) const {
     const double along = wall.tangent().dot(corner.base_from_corner.translation() - wall.centroid);
+    const LineByRange by_range(wall, points_);
     for (int i = wall.first; i <= wall.last; ++i) {
-      const double turn = turnByRange(wall, points_, i);
+      const double turn = by_range.turn(i);
       auto column = corner.by_range.col(i - corner.first);
-      column.head<2>() = meet_by_offset * (shiftByRange(wall, points_, i) - turn * along);
+      column.head<2>() = meet_by_offset * (by_range.shift(i) - turn * along);
       column.z() = 0.5 * turn;
     }
   }

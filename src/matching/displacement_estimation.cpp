@@ -17,15 +17,40 @@ namespace {
 using MatrixDD = Displacement::MatrixDD;
 using MatrixD3 = Displacement::MatrixD3;
 
-/// Minimises the robust loss in the seen directions, pairs and weights fixed.
+/// Derivatives of the loss by the displacement, at one of a search.
+struct LossSlope {
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  // Σ w A Aᵀ: the hessian of the loss with its weights fixed
+
+  LossSlope(const AlignmentProblem& problem, const SE2& x) {
+    const RigidMotion motion(x);
+    for (const Residual& residual : problem.residuals()) {
+      const ResidualTerms t = problem.terms(residual, motion);
+      const double influence = problem.kernel().influence(t.e);
+      const Eigen::Matrix3d square = t.A * t.A.transpose();
+      gradient += influence * t.A;
+      information += problem.kernel().weight(t.e) * square;
+      hessian += problem.kernel().slope(t.e) * square;
+      hessian(2, 2) -= influence / residual.std * residual.normal.dot(t.lever);
+    }
+  }
+};
+
+/// Minimises the robust loss in the seen directions, pairs and weights fixed: by Newton's steps where the loss is
+/// convex, by those of reweighted least squares, which are many but never lead uphill, elsewhere.
 SE2 minimise(const AlignmentProblem& problem, SE2 x, const ObservableDirections& seen) {
   constexpr int kMaxIterations = 30;
   constexpr double kStep = 1e-9;
+  constexpr double kConvex = 0.3;  // of the curvature with weights fixed
+  const auto& B = seen.basis;
   for (int i = 0; i < kMaxIterations; ++i) {
-    const auto equations = problem.normalEquations(x);
-    const MatrixDD information = seen.basis.transpose() * equations.information * seen.basis;
-    const Eigen::VectorXd step = -information.ldlt().solve(seen.basis.transpose() * equations.gradient);
-    x = corrected(x, seen.basis * step);
+    const LossSlope slope(problem, x);
+    const MatrixDD hessian = B.transpose() * slope.hessian * B;
+    const MatrixDD information = B.transpose() * slope.information * B;
+    const bool convex = Eigen::LLT<MatrixDD>(hessian - kConvex * information).info() == Eigen::Success;
+    const Eigen::VectorXd step = -(convex ? hessian : information).ldlt().solve(B.transpose() * slope.gradient);
+    x = corrected(x, B * step);
     if (step.norm() < kStep) break;
   }
   return x;
@@ -62,10 +87,11 @@ double addSurfaceDerivatives(const AlignmentProblem& problem, const Residual& re
   const double along = surface.tangent().dot(t.offset);
   const Eigen::Vector3d by_angle = problem.kernel().influence(t.e) * AlignmentProblem::derivativeByNormal(residual, t);
   const Eigen::Vector3d by_residual = problem.kernel().slope(t.e) / residual.std * t.A;
+  const LineByRange by_range(surface, points);
   double together = 0.0;
   for (int j = surface.first; j <= surface.last; ++j) {
-    const double turn = turnByRange(surface, points, j);
-    const double shift = -shiftByRange(surface, points, j) + along * turn;
+    const double turn = by_range.turn(j);
+    const double shift = -by_range.shift(j) + along * turn;
     out.by_reference.col(points.beam[static_cast<std::size_t>(j)]) += by_angle * turn + by_residual * shift;
     together += shift;
   }

@@ -27,6 +27,13 @@ void split(const std::vector<Eigen::Vector2d>& points, int begin, int end, doubl
   split(points, farthest, end, most, bends);
 }
 
+/// Unit vector at half the angle of v, which has that norm.
+Eigen::Vector2d atHalfTheAngle(const Eigen::Vector2d& v, double norm) {
+  if (norm == 0.0) return Eigen::Vector2d::UnitX();
+  if (v.x() >= 0.0) return Eigen::Vector2d(norm + v.x(), v.y()).normalized();
+  return Eigen::Vector2d(std::abs(v.y()), std::copysign(norm - v.x(), v.y())).normalized();
+}
+
 }  // namespace
 
 LineFits::LineFits(const std::vector<Eigen::Vector2d>& points) : sums_(points.size() + 1, Sums::Zero()) {
@@ -44,11 +51,11 @@ LineFits::Fit LineFits::fit(int first, int last) const {
   const double xx = s(2) - n * c.x() * c.x();
   const double xy = s(3) - n * c.x() * c.y();
   const double yy = s(4) - n * c.y() * c.y();
-  const double half_spread = std::hypot(0.5 * (xx - yy), xy);
-  const double direction = 0.5 * std::atan2(xy, 0.5 * (xx - yy));
+  const Eigen::Vector2d doubled(0.5 * (xx - yy), xy);  // points along twice the angle of the line
+  const double half_spread = doubled.norm();
   const double across = std::max(0.0, 0.5 * (xx + yy) - half_spread);
-  const Eigen::Vector2d normal(-std::sin(direction), std::cos(direction));
-  return {{c, normal, first, last, 2.0 * half_spread}, std::sqrt(across / std::max(1.0, n - 2.0))};
+  return {{c, quarterTurn(atHalfTheAngle(doubled, half_spread)), first, last, 2.0 * half_spread},
+          std::sqrt(across / std::max(1.0, n - 2.0))};
 }
 
 bool connected(const ScannedPoints& points, std::size_t i, double range_noise, double angle_increment) {

@@ -87,10 +87,11 @@ class LineSearch {
     const auto along = [&](int i) { return x.dot(points_.point[index(i)] - fitted.centroid); };
     line.base_from_line = SE2(fitted.centroid.x(), fitted.centroid.y(), std::atan2(x.y(), x.x()));
     std::tie(line.from, line.to) = std::minmax({along(wall.first), along(wall.last)});
+    const LineByRange by_range(fitted, points);
     line.by_range.resize(3, n);
     for (int i = 0; i < n; ++i) {
-      line.by_range.col(i).head<2>() = fitted.normal * shiftByRange(fitted, points, i);
-      line.by_range.col(i).z() = turnByRange(fitted, points, i);
+      line.by_range.col(i).head<2>() = fitted.normal * by_range.shift(i);
+      line.by_range.col(i).z() = by_range.turn(i);
     }
     line.covariance = scan_.range_noise * scan_.range_noise * line.by_range * line.by_range.transpose();
     line.covariance.topLeftCorner<2, 2>() += options_.std_offset * options_.std_offset * y * y.transpose();

@@ -55,9 +55,9 @@ class Search {
   std::optional<Alignment> runNear() const { return align(mean_, options_.pairs.max_distance); }
 
  private:
-  static constexpr double kRough = 2.0;      // residuals of twice what noise explains
-  static constexpr double kSurprise = 16.0;  // four sigma from the prior
-  static constexpr double kGain = 0.3;       // of the points' cost, for each: for less the prior is not given up
+  static constexpr double kRough = 2.0;          // residuals of twice what noise explains
+  static constexpr double kSurprise = 16.0;      // four sigma from the prior
+  static constexpr double kGain = 0.3;           // of the points' cost, for each: for less the prior is not given up
   static constexpr double kAgreesBetter = 0.05;  // for less one place far from the prior is not left for another
 
   static Eigen::Matrix3d priorFloor(const MatcherOptions& options) {
@@ -115,8 +115,9 @@ class Search {
   /// first, and up to max_distance in the end. Empty with too few pairs.
   std::optional<Alignment> align(SE2 x, double distance) const {
     constexpr double kSettled = 1e-3;  // [m, rad] points do not change partners for less; the estimate finds the rest
+    NearestNeighbours neighbours(reference_, current_);
     for (int i = 1;; ++i) {
-      AlignmentProblem problem(reference_, current_, x, distance, options_.pairs);
+      AlignmentProblem problem(reference_, current_, x, neighbours.pairs(RigidMotion(x), distance), options_.pairs);
       if (problem.pairs().size() < static_cast<std::size_t>(options_.min_pairs)) return std::nullopt;
       const Eigen::Vector3d step = mapStep(problem.normalEquations(x), x);
       x = corrected(x, step);

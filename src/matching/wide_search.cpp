@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "sckf_odometry/matching/alignment_problem.h"
+#include "sckf_odometry/core/se2.h"
 
 namespace sckf {
 
@@ -126,7 +126,7 @@ class WideSearch {
 
   Place bestOfTurn(int turn) {
     const RigidMotion motion({predicted_.x, predicted_.y, predicted_.yaw + turn * kYawStep});
-    for (std::size_t k = 0; k < points_.size(); ++k) cells_[k] = cellOf(motion.C * points_[k] + motion.t);
+    for (std::size_t k = 0; k < points_.size(); ++k) cells_[k] = cellOf(motion * points_[k]);
     Place best{by_cell_.sum(cells_, 0, 0) - priceOf(turn, 0, 0), turn, 0, 0};
     for (int row = -steps_; row <= steps_; row += kBlock) {
       for (int column = -steps_; column <= steps_; column += kBlock) {

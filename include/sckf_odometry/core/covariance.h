@@ -17,6 +17,9 @@ bool isPositiveDefinite(const Eigen::Matrix3d& P);
 /// What is wrong with a pose and its covariance as an estimate, what was expected; empty if nothing is.
 std::string problemOf(const SE2& pose, const Eigen::Matrix3d& covariance);
 
+/// J R Jᵀ, with the diagonal of R: what J (d × M, few rows) makes of independent errors.
+Eigen::MatrixXd carriedOver(const Eigen::MatrixXd& J, const Eigen::VectorXd& variances);
+
 /// The symmetric part: rounding must not make a covariance drift from symmetry.
 template <typename Derived>
 typename Derived::PlainObject symmetric(const Eigen::MatrixBase<Derived>& P) {

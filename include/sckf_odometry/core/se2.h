@@ -28,6 +28,16 @@ struct SE2 {
   Eigen::Vector2d operator*(const Eigen::Vector2d& point) const { return rotation() * point + translation(); }
 };
 
+/// A displacement that is applied to many points: its sine and cosine taken once.
+struct RigidMotion {
+  explicit RigidMotion(const SE2& x) : C(x.rotation()), t(x.translation()) {}
+
+  Eigen::Vector2d operator*(const Eigen::Vector2d& point) const { return C * point + t; }
+
+  Eigen::Matrix2d C;
+  Eigen::Vector2d t;  ///< [m]
+};
+
 /// 𝒥 p = [0 −1; 1 0] p: p turned by a quarter, the derivative of C(φ) p by φ at φ = 0.
 inline Eigen::Vector2d quarterTurn(const Eigen::Vector2d& p) { return {-p.y(), p.x()}; }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sckf_odometry/core/se2.h"
+#include "sckf_odometry/matching/nearest_neighbours.h"
 #include "sckf_odometry/matching/prepared_scan.h"
 
 namespace sckf {
@@ -18,12 +19,6 @@ struct PairOptions {
   double surface_roughness = 0.01;  ///< [m] std of a surface about the straight line fitted to it
   double point_std = 0.02;          ///< [m] std of a point on no straight surface, beside range noise and point spacing
   double robust_width = 3.0;        ///< a residual of this many std weighs half (Cauchy)
-};
-
-/// A point of the current scan and its nearest point of the reference scan: indices of points, not of beams.
-struct Pair {
-  int reference = 0;
-  int current = 0;
 };
 
 /// Cauchy's robust loss ρ(e) = c²/2 log(1 + e²/c²) of a residual in units of its std.
@@ -50,13 +45,6 @@ struct Residual {
   double std = 1.0;                  ///< σ [m]
 };
 
-/// A displacement that is applied to many points: its sine and cosine taken once.
-struct RigidMotion {
-  explicit RigidMotion(const SE2& x) : C(x.rotation()), t(x.translation()) {}
-  Eigen::Matrix2d C;
-  Eigen::Vector2d t;  ///< [m]
-};
-
 /// Everything that one residual has to tell at a displacement.
 struct ResidualTerms {
   double e;                ///< the residual, in units of its std
@@ -79,6 +67,9 @@ class AlignmentProblem {
   /// outlive the problem.
   AlignmentProblem(const PreparedScan& reference, const PreparedScan& current, const SE2& reference_from_current,
                    double max_distance, const PairOptions& options);
+  /// The same of points that are paired already.
+  AlignmentProblem(const PreparedScan& reference, const PreparedScan& current, const SE2& reference_from_current,
+                   const std::vector<Pair>& neighbours, const PairOptions& options);
 
   const PreparedScan& reference() const { return reference_; }
   const PreparedScan& current() const { return current_; }
@@ -124,5 +115,25 @@ class AlignmentProblem {
   RobustKernel kernel_;
   double scale_ = 1.0;
 };
+
+// These are inline because most of the time of a match is spent in them.
+
+inline ResidualTerms AlignmentProblem::terms(const Residual& residual,
+                                             const RigidMotion& reference_from_current) const {
+  ResidualTerms terms;
+  terms.lever = reference_from_current.C * current_.points.point[static_cast<std::size_t>(residual.current)];
+  terms.offset = terms.lever + reference_from_current.t - residual.anchor;
+  terms.e = residual.normal.dot(terms.offset) / residual.std;
+  terms.A << residual.normal, residual.normal.dot(quarterTurn(terms.lever));
+  terms.A /= residual.std;
+  return terms;
+}
+
+inline Eigen::Vector3d AlignmentProblem::derivativeByNormal(const Residual& residual, const ResidualTerms& terms) {
+  const Eigen::Vector2d tangent = quarterTurn(residual.normal);
+  Eigen::Vector3d dA;
+  dA << tangent, tangent.dot(quarterTurn(terms.lever));
+  return dA / residual.std;
+}
 
 }  // namespace sckf

@@ -26,19 +26,34 @@ class LineFits {
   std::vector<Sums> sums_;
 };
 
-/// How a fitted line changes with the range of point i, which it was fitted to: the angle of its normal [rad/m] …
-inline double turnByRange(const Surface& line, const ScannedPoints& points, int i) {
-  const auto k = static_cast<std::size_t>(i);
-  const Eigen::Vector2d d = points.point[k] - line.centroid;
-  const Eigen::Vector2d& n = line.normal;
-  const Eigen::Vector2d tangent = line.tangent();
-  return -(tangent.dot(points.ray[k]) * n.dot(d) + tangent.dot(d) * n.dot(points.ray[k])) / line.spread;
-}
+/// How a fitted line changes with the range of any point that it was fitted to.
+class LineByRange {
+ public:
+  LineByRange(const Surface& line, const ScannedPoints& points)
+      : points_(points),
+        centroid_(line.centroid),
+        normal_(line.normal),
+        by_spread_(1.0 / line.spread),
+        by_size_(1.0 / line.size()) {}
 
-/// … and its centroid, across it.
-inline double shiftByRange(const Surface& line, const ScannedPoints& points, int i) {
-  return line.normal.dot(points.ray[static_cast<std::size_t>(i)]) / line.size();
-}
+  /// The angle of its normal [rad/m] …
+  double turn(int point) const {
+    const auto k = static_cast<std::size_t>(point);
+    const Eigen::Vector2d d = points_.point[k] - centroid_;
+    const Eigen::Vector2d tangent = quarterTurn(normal_);
+    return -by_spread_ * (tangent.dot(points_.ray[k]) * normal_.dot(d) + tangent.dot(d) * normal_.dot(points_.ray[k]));
+  }
+
+  /// … and its centroid, across it.
+  double shift(int point) const { return by_size_ * normal_.dot(points_.ray[static_cast<std::size_t>(point)]); }
+
+ private:
+  const ScannedPoints& points_;
+  Eigen::Vector2d centroid_;
+  Eigen::Vector2d normal_;
+  double by_spread_;
+  double by_size_;
+};
 
 /// Whether the points i and i + 1 can lie on one surface: no farther apart than on a surface seen at a grazing angle
 /// (the adaptive breakpoint of Borges and Aldon).
