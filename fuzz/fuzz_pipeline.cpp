@@ -74,7 +74,8 @@ struct Robot {
 /// What only one method has.
 void switchOthersOn(PipelineOptions& options, Bytes& bytes) {
   const bool can = options.method == "sckf_multi";
-  options.calibration.on = can && bytes.chance();
+  if (bytes.chance()) options.calibration.rotation_std = options.calibration.rotation_per_meter_std = 0.0;
+  if (bytes.chance()) options.calibration.distance_std = options.calibration.laser_ahead_std = 0.0;
   options.imu.gyro = can && bytes.chance();
   options.imu.orientation = can && bytes.chance();
   options.pose_updates.on = can && bytes.chance();

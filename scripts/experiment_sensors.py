@@ -251,12 +251,12 @@ def calibration(setting: Setting) -> Result:
     figure, ((scale, position),) = new_figure(1, 2, 11.0, 4.2)
     _draw_trace(scale, calibrated, "scale", "scale of the way, first robot [%]", 100.0)
     for table, colour, style, label in ((trusting, WITHOUT, "--", "without"),
-                                        (calibrated, WITH, "-", "calibrate_odometry")):
+                                        (calibrated, WITH, "-", "calibration_..._std")):
         position.plot(table["time"], 100.0 * table["position"], style, color=colour, label=label)
     position.axvline(calibrated["time"][middle - 1], color=GREY, linestyle=":", label="blind from here on")
     position.set(xlabel="time [s]", ylabel="rms error of the position [cm]", ylim=(0.0, None))
     position.legend(loc="upper left")
-    result = Result("calibration", "systematic errors of the wheels (`calibrate_odometry`)",
+    result = Result("calibration", "systematic errors of the wheels (`calibration_..._std`)",
                     figures=[save_figure(figure, setting, "extensions_calibration.png")])
     _note(result, robots, ("position", "yaw"))
     result.numbers.update({"scale_at_first": float(calibrated["scale"][0]),
@@ -273,5 +273,5 @@ def calibration(setting: Setting) -> Result:
         markdown_table(["", "position", "yaw", "NEES"], [
             [label, f"{100 * n[f'{name}_position']:.1f} cm", f"{math.degrees(n[f'{name}_yaw']):.2f}°",
              f"{n[f'{name}_nees']:.1f}"]
-            for name, label in (("without", "without"), ("with", "`calibrate_odometry`"))])]
+            for name, label in (("without", "without"), ("with", "estimated"))])]
     return result

@@ -56,10 +56,12 @@ ErrorState::Ranges ErrorState::addRanges(const Eigen::VectorXd& variances) {
 }
 
 void ErrorState::move(Part part, const MatrixXd& B, Part by) {
-  P_.middleRows(part.row, part.size) += B * P_.middleRows(by.row, by.size);
+  const MatrixXd of_part = B * P_.middleRows(by.row, by.size);
+  P_.middleRows(part.row, part.size) += of_part;
   P_.middleCols(part.row, part.size) += P_.middleCols(by.row, by.size) * B.transpose();
   for (auto& [scan, noise] : ranges_) {
-    noise.coordinates.middleCols(part.row, part.size) += noise.coordinates.middleCols(by.row, by.size) * B.transpose();
+    auto to = noise.coordinates.middleCols(part.row, part.size);
+    to += noise.coordinates.middleCols(by.row, by.size).lazyProduct(B.transpose());
   }
 }
 
@@ -78,15 +80,6 @@ MatrixXd ErrorState::coordinates(const RangeNoise& noise, const Measurement& m) 
   return of_r;
 }
 
-/// E{z̃ rᵀ} of the range noise of a scan, M × d.
-MatrixXd ErrorState::correlate(const RangeNoise& noise, Ranges scan, const Measurement& m) {
-  MatrixXd P_zr = noise.directions * coordinates(noise, m);
-  for (const auto& [used, J] : m.ranges) {
-    if (used == scan) P_zr.noalias() += noise.variances.asDiagonal() * J.transpose();
-  }
-  return P_zr;
-}
-
 ErrorState::Correlation ErrorState::correlate(const Measurement& m) const {
   Correlation out{MatrixXd::Zero(P_.rows(), m.residual.size()), m.noise};
   for (const auto& [part, H] : m.terms) out.state.noalias() += P_.middleCols(part.row, part.size) * H.transpose();
@@ -94,9 +87,10 @@ ErrorState::Correlation ErrorState::correlate(const Measurement& m) const {
     const RangeNoise& noise = ranges_.at(scan);
     const MatrixXd J_D = J * noise.directions;
     out.state.noalias() += noise.coordinates.transpose() * J_D.transpose();
+    out.innovation += carriedOver(J, noise.variances);
+    out.innovation.noalias() += J_D * coordinates(noise, m);
   }
   for (const auto& [part, H] : m.terms) out.innovation.noalias() += H * out.state.middleRows(part.row, part.size);
-  for (const auto& [scan, J] : m.ranges) out.innovation.noalias() += J * correlate(ranges_.at(scan), scan, m);
   out.innovation = symmetric(out.innovation);
   return out;
 }
@@ -113,28 +107,28 @@ void ErrorState::addDirections(RangeNoise& noise, const MatrixXd& directions, co
   noise.coordinates.setIdentity(N, N);
 }
 
-std::vector<Eigen::VectorXd> ErrorState::update(const Measurement& m, const std::vector<Part>& corrected) {
-  const Correlation with_r = correlate(m);
+void ErrorState::update(const Measurement& m, const Correlation& with_r, const std::vector<Gain>& gains) {
+  if (gains.empty()) return;
   MatrixXd K = MatrixXd::Zero(P_.rows(), m.residual.size());
-  std::vector<Eigen::VectorXd> corrections;
-  for (const Part& part : corrected) {
-    K.middleRows(part.row, part.size) = with_r.gain(part);
-    corrections.emplace_back(K.middleRows(part.row, part.size) * m.residual);
+  Index first = P_.rows();  // of the rows that are corrected …
+  Index end = 0;            // … and after the last
+  for (const auto& [part, gain] : gains) {
+    K.middleRows(part.row, part.size) = gain;
+    first = std::min(first, part.row);
+    end = std::max(end, part.row + part.size);
   }
   for (auto& [scan, noise] : ranges_) {
-    const MatrixXd of_r = coordinates(noise, m);
-    for (const Part& part : corrected) {
-      noise.coordinates.middleCols(part.row, part.size).noalias() -=
-          of_r * K.middleRows(part.row, part.size).transpose();
-    }
+    auto of_corrected = noise.coordinates.middleCols(first, end - first);
+    of_corrected.noalias() -= coordinates(noise, m) * K.middleRows(first, end - first).transpose();
   }
   for (const auto& [scan, J] : m.ranges) {
     RangeNoise& noise = ranges_.at(scan);
     addDirections(noise, noise.variances.asDiagonal() * J.transpose(), -K.transpose());
   }
-  const MatrixXd K_P_rx = K * with_r.state.transpose();
-  P_ = symmetric(P_ - K_P_rx - K_P_rx.transpose() + K * with_r.innovation * K.transpose());
-  return corrections;
+  // P − K P_rx − P_xr Kᵀ + K S Kᵀ, one half of it
+  const MatrixXd P_xr = with_r.state - 0.5 * K * with_r.innovation;
+  for (Index i = 0; i < K.cols(); ++i) P_.selfadjointView<Eigen::Lower>().rankUpdate(K.col(i), P_xr.col(i), -1.0);
+  P_.triangularView<Eigen::StrictlyUpper>() = P_.transpose();
 }
 
 }  // namespace sckf

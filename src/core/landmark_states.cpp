@@ -65,7 +65,7 @@ Innovation MultiCloneFilter::innovation(std::size_t landmark, const Sighting& si
 }
 
 void MultiCloneFilter::update(std::size_t landmark, const Sighting& sighting) {
-  correct(measurement(landmark, sighting), allStates());
+  correct(measurement(landmark, sighting), allStates(), clones_.back().error);
 }
 
 }  // namespace sckf

@@ -1,6 +1,7 @@
 #include "sckf_odometry/core/multi_clone_filter.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -109,7 +110,11 @@ void MultiCloneFilter::propagate(const OdometryIncrement& increment) {
   } else {
     measureMotion(increment, W);
   }
-  if (calibrates) forgetCalibration(increment.before_from_after.translation().norm());
+  if (calibrates) {
+    constexpr double kLongest = 0.05;  // of the way after which the calibration may be another one, without a reference
+    way_to_forget_ += increment.before_from_after.translation().norm();
+    if (way_to_forget_ > kLongest * options_.calibration_way) forgetCalibration();
+  }
   beginScan();
 }
 
@@ -143,7 +148,7 @@ void MultiCloneFilter::measureMotion(const OdometryIncrement& increment, const M
   std::vector<Part> parts = statesNotCloned();
   parts.push_back(noise_error);
   for (const MotionMeasurement& z : increment.measured) {
-    noise += correct(measurement(z, noise, noise_error), parts).back();
+    noise += correct(measurement(z, noise, noise_error), parts, clones_.front().error).back();
   }
   errors_.remove(noise_error);
 }
@@ -172,8 +177,11 @@ OdometryIncrement MultiCloneFilter::refined(const OdometryIncrement& increment) 
   return motion;
 }
 
-void MultiCloneFilter::forgetCalibration(double way) {
-  const double kept = std::exp(-way / options_.calibration_way);
+/// At each reference: from there to the next scan the calibration is the same, so that what a displacement tells of it
+/// can be told from what it tells of the way before, see gains().
+void MultiCloneFilter::forgetCalibration() {
+  if (!calibration_error_) return;
+  const double kept = std::exp(-std::exchange(way_to_forget_, 0.0) / options_.calibration_way);
   calibration_ *= kept;
   const Eigen::Index n = calibrated_.cols();
   errors_.move(*calibration_error_, (kept - 1.0) * MatrixXd::Identity(n, n), *calibration_error_);
@@ -213,7 +221,7 @@ Innovation MultiCloneFilter::innovation(const Displacement& z) const {
   r.residual = z.observable * error(z.reference_from_current, z_hat);   // (17), projected on V_o
   r.H_clone = z.observable * H_k;                                       // (18)
   r.H_pose = z.observable * H_x;
-  r.noise = z.J_current * z.variance_current.asDiagonal() * z.J_current.transpose() + z.matching_noise;
+  r.noise = carriedOver(z.J_current, z.variance_current) + z.matching_noise;
   const ErrorState::Correlation with_r = errors_.correlate(measurement(z, r));
   r.covariance = with_r.innovation;                     // (19)
   r.gain = additive(pose_) * with_r.gain(pose_error_);  // (21)
@@ -233,7 +241,9 @@ ErrorState::Measurement MultiCloneFilter::measurement(const Displacement& z, con
 
 void MultiCloneFilter::update(const Displacement& z, const Innovation& r) {
   if (!present_) present_ = errors_.addRanges(z.variance_current);
-  correct(measurement(z, r), z.clone == 0 ? statesNotCloned() : allStates());  // (22)(23)
+  const bool newest = z.clone == 0;
+  correct(measurement(z, r), newest ? statesNotCloned() : allStates(),
+          newest ? clones_.front().error : clones_.back().error);  // (22)(23)
 }
 
 void MultiCloneFilter::clone(const Eigen::VectorXd& range_variances) {
@@ -241,6 +251,7 @@ void MultiCloneFilter::clone(const Eigen::VectorXd& range_variances) {
   if (start_is_reference) forget(0);  // which was no scan
   if (present_ && errors_.variances(*present_).size() != range_variances.size()) beginScan();
   if (!present_) present_ = errors_.addRanges(range_variances);  // not used: independent of all poses
+  forgetCalibration();
   clones_.insert(clones_.begin(), {pose_, errors_.addCloneOf(pose_error_), *present_});  // (24)-(27)
   present_.reset();
 }
@@ -288,7 +299,7 @@ double MultiCloneFilter::updateHeading(double yaw, double variance, double nis_b
 double MultiCloneFilter::update(const Measurement& m, double nis_bound) {
   const MatrixXd S = errors_.correlate(m).innovation;
   const double nis = m.residual.dot(S.llt().solve(m.residual));
-  if (nis <= nis_bound) correct(m, allStates());
+  if (nis <= nis_bound) correct(m, allStates(), std::nullopt);
   return nis;
 }
 
@@ -330,10 +341,52 @@ std::vector<ErrorState::Part> MultiCloneFilter::allStates() const {
   return parts;
 }
 
-std::vector<Eigen::VectorXd> MultiCloneFilter::correct(const Measurement& measurement, const std::vector<Part>& parts) {
-  std::vector<Eigen::VectorXd> corrections = errors_.update(measurement, parts);
+/// Whether a part is the error of a pose, a clone or a landmark: one of the world.
+bool MultiCloneFilter::isPlace(const Part& part) const {
+  const auto is_of = [&part](const auto& state) { return state.error.row == part.row; };
+  return part.row == pose_error_.row || std::any_of(clones_.begin(), clones_.end(), is_of) ||
+         std::any_of(landmarks_.begin(), landmarks_.end(), is_of);
+}
+
+/// What is learned of the wheels tells where the anchor must have been, too, since they led there: by so much it would
+/// be corrected, size × d.
+MatrixXd MultiCloneFilter::learnedOf(const Part& anchor, const ErrorState::Correlation& with_r) const {
+  MatrixXd learned = MatrixXd::Zero(anchor.size, with_r.innovation.cols());
+  for (const auto& part : {calibration_error_, gyro_bias_error_}) {
+    if (!part) continue;
+    const MatrixXd by_wheels = errors_.covariance(*part).llt().solve(errors_.covariance(*part, anchor)).transpose();
+    learned += by_wheels * with_r.gain(*part);
+  }
+  return learned;
+}
+
+/// Those that are best, but for one thing: a displacement tells where poses are relative to each other, and what it
+/// tells of the wheels is for the way to come. They led all the way behind, too. If that were corrected as well, all of
+/// it would turn about where the estimate began, odom → base_link would jump by metres, and pose and reference would
+/// come apart where the wheels slip, since corrections of that size do not just add.
+std::vector<ErrorState::Gain> MultiCloneFilter::gains(const ErrorState::Correlation& with_r,
+                                                      const std::vector<Part>& parts,
+                                                      const std::optional<Part>& anchor) const {
+  std::vector<ErrorState::Gain> gains;
+  gains.reserve(parts.size());
+  for (const Part& part : parts) gains.push_back({part, with_r.gain(part)});
+  if (!anchor || !(calibration_error_ || gyro_bias_error_)) return gains;
+  const MatrixXd learned = learnedOf(*anchor, with_r);
+  for (auto& [part, K] : gains) {
+    if (isPlace(part)) K -= learned;
+  }
+  return gains;
+}
+
+std::vector<Eigen::VectorXd> MultiCloneFilter::correct(const Measurement& measurement, const std::vector<Part>& parts,
+                                                       const std::optional<Part>& anchor) {
+  const ErrorState::Correlation with_r = errors_.correlate(measurement);
+  const std::vector<ErrorState::Gain> gains = this->gains(with_r, parts, anchor);
+  errors_.update(measurement, with_r, gains);
+  std::vector<Eigen::VectorXd> corrections;
+  corrections.reserve(parts.size());
   for (std::size_t i = 0; i < parts.size(); ++i) {
-    const Eigen::VectorXd& c = corrections[i];
+    const Eigen::VectorXd& c = corrections.emplace_back(gains[i].K * measurement.residual);
     const auto is = [&](const std::optional<Part>& part) { return part && part->row == parts[i].row; };
     if (is(pose_error_)) pose_ = compose(exponential(c), pose_);
     if (is(calibration_error_)) calibration_ += calibrated_ * c;

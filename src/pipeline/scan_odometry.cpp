@@ -27,7 +27,6 @@ void checkStates(const PipelineOptions& options) {
                                 "\"; only \"sckf_multi\" has states beside the pose");
   };
   if (options.method == "sckf_multi") return;
-  if (options.calibration.on) refuse("calibrate_odometry is true", "false");
   if (options.imu.gyro) refuse("use_imu is true", "false");
   if (options.imu.orientation) refuse("use_imu_orientation is true", "false");
   if (options.pose_updates.on) refuse("use_pose_updates is true", "false");

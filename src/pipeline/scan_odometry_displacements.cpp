@@ -145,8 +145,12 @@ double ScanOdometry::gate(const Displacement& displacement) const {
 }
 
 bool ScanOdometry::looksLikeSlip(const Match& match) const {
-  return options_.gate.trust_scans_on_slip && match.displacement->dimension() >= 2 &&
-         match.agreement >= options_.gate.slip_min_agreement && match.residual_rms <= options_.gate.slip_max_residual;
+  const GateOptions& gate = options_.gate;
+  const Eigen::Index seen = match.displacement->dimension();
+  // One wall lies on any other, however the robot is turned.
+  const bool placed = seen == 3 || (seen == 2 && match.overlap >= gate.slip_min_overlap);
+  return gate.trust_scans_on_slip && placed && match.agreement >= gate.slip_min_agreement &&
+         match.residual_rms <= gate.slip_max_residual;
 }
 
 void ScanOdometry::useHeading(ScanReport& report) {

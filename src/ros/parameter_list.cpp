@@ -99,10 +99,9 @@ List otherSensors(PipelineOptions& pipeline) {
   StandstillOptions& standstill = pipeline.standstill;
   return {
       number("calibration_distance_std", calibration.distance_std, within(0.0, 1.0)),
-      flag("calibrate_odometry", calibration.on),
-      number("calibration_rotation_std", calibration.rotation_std, aboveUpTo(0.0, 1.0)),
-      number("calibration_rotation_per_meter_std", calibration.rotation_per_meter_std, aboveUpTo(0.0, 1.0), "rad/m"),
-      number("calibration_laser_ahead_std", calibration.laser_ahead_std, aboveUpTo(0.0, 1.0), "m"),
+      number("calibration_rotation_std", calibration.rotation_std, within(0.0, 1.0)),
+      number("calibration_rotation_per_meter_std", calibration.rotation_per_meter_std, within(0.0, 1.0), "rad/m"),
+      number("calibration_laser_ahead_std", calibration.laser_ahead_std, within(0.0, 1.0), "m"),
       number("calibration_way", calibration.way, within(0.1, 1e6), "m"),
       flag("use_pose_updates", pipeline.pose_updates.on),
       number("pose_update_max_rejected", pipeline.pose_updates.max_rejected, within(1, 1e6), "poses"),
@@ -173,6 +172,7 @@ List estimationParameters(PipelineOptions& pipeline) {
       number("slip_std_yaw", gate.slip_std_yaw, within(0.0, 100.0), "rad"),
       number("slip_min_agreement", gate.slip_min_agreement, within(0.0, 1.0)),
       number("slip_max_residual", gate.slip_max_residual, aboveUpTo(0.0, 1000.0)),
+      number("slip_min_overlap", gate.slip_min_overlap, within(0.0, 1.0)),
       number("scan_patience", pipeline.scan_patience, within(0.0, 60.0), "s"),
       number("max_scan_delay", pipeline.max_scan_delay, aboveUpTo(0.0, 1e6), "s"),
       number("max_waiting_scans", pipeline.max_waiting_scans, within(1, 100000), "scans"),

@@ -73,16 +73,35 @@ class WindowsTest(OnLogs):
     PATTERN = r"NEES at their ends, median (\S+) .*inside 3 sigma: x (\S+), y (\S+), yaw (\S+) "
 
     def test_intel(self) -> None:
-        self.check_recorded("intel", Found(2.1, 0.945))
+        self.check_recorded("intel", Found(1.7, 0.945))
 
     def test_aces(self) -> None:
-        self.check_recorded("aces", Found(2.3, 0.98))
+        self.check_recorded("aces", Found(2.0, 0.98))
 
     def test_freiburg_079(self) -> None:
         self.check_recorded("freiburg-079", Found(5.3, 0.87))
 
     def test_simulated_log_of_mrpt(self) -> None:
-        self.check_simulated(Found(3.8, 0.97))
+        self.check_simulated(Found(3.2, 0.975))
+
+
+class WhitenessTest(ScriptCase):
+    """Innovations: what goes on from scan to scan is an error that the filter has no state for."""
+    SCRIPT = "consistency"
+
+    def check(self, log: str, bag: Path, bound: float) -> None:
+        said = self.said(str(bag))
+        lines = re.findall(r"^  (x|y|yaw) +mean square [^;]*;(.*)$", said, re.MULTILINE)
+        self.assertEqual([axis for axis, _ in lines], ["x", "y", "yaw"], said)
+        worst = max(abs(float(value)) for _, values in lines for value in values.split())
+        print(f"\n{log}, innovations: autocorrelation up to {worst:.3f} (at most {bound})")
+        self.assertLessEqual(worst, bound, said)
+
+    def test_intel(self) -> None:
+        self.check("intel", recorded("intel"), 0.14)
+
+    def test_simulated_log_of_mrpt(self) -> None:
+        self.check("simulated", simulated(Path(self.folder.name))[0], 0.22)
 
 
 if __name__ == "__main__":

@@ -104,9 +104,9 @@ class DriftTest(unittest.TestCase):
         self.assertGreaterEqual(both.covered, COVERAGE * both.reference_poses)
         print(f"\nintel, a laser for each half: {both.translation_percent:.2f} %, {both.rotation_deg_per_m:.3f} °/m; the "
               f"right one alone: {right.translation_percent:.2f} %, {right.rotation_deg_per_m:.3f} °/m")
-        self.assertLess(both.translation_percent, 1.4)
-        self.assertLess(both.rotation_deg_per_m, 0.12)
-        self.assertLess(both.translation_percent, right.translation_percent)
+        self.assertLess(both.translation_percent, 1.15)
+        self.assertLess(both.rotation_deg_per_m, 0.11)
+        self.assertLess(both.translation_percent, 0.9 * right.translation_percent)
 
     def test_intel_raw(self) -> None:
         self.check_recorded("intel-raw", 1.24, 0.074)

@@ -43,17 +43,15 @@ class Everything {
 
   void disturb(Rows rows, const MatrixXd& Q) { P_.block(rows.first, rows.first, rows.size, rows.size) += Q; }
 
-  /// H of everything; returns K of everything that may be corrected.
-  MatrixXd update(const MatrixXd& H, const MatrixXd& noise, const std::vector<Rows>& corrected) {
+  /// H of everything; the best K.
+  MatrixXd gain(const MatrixXd& H, const MatrixXd& noise) const {
     const MatrixXd S = H * P_ * H.transpose() + noise;
-    const MatrixXd optimal = P_ * H.transpose() * S.inverse();
-    MatrixXd K = MatrixXd::Zero(P_.rows(), H.rows());
-    for (const Rows& rows : corrected) {
-      K.middleRows(rows.first, rows.size) = optimal.middleRows(rows.first, rows.size);
-    }
+    return P_ * H.transpose() * S.inverse();
+  }
+
+  void update(const MatrixXd& H, const MatrixXd& noise, const MatrixXd& K) {
     const MatrixXd I_KH = MatrixXd::Identity(P_.rows(), P_.rows()) - K * H;
     P_ = I_KH * P_ * I_KH.transpose() + K * noise * K.transpose();
-    return K;
   }
 
   MatrixXd block(Rows a, Rows b) const { return P_.block(a.first, b.first, a.size, b.size); }
@@ -110,30 +108,31 @@ class ErrorStateTest : public testing::Test {
     m.residual = random_.gaussian(d);
     m.noise = random_.covariance(d, 0.5);
     MatrixXd H = MatrixXd::Zero(d, all_.size());
-    std::vector<Part> corrected;
-    std::vector<Everything::Rows> corrected_rows;
+    std::vector<Named> corrected;
     for (const Named& named : parts_) {
       if (random_.uniform(0.0, 1.0) < 0.5) {
         m.terms.push_back({named.part, random_.gaussian(d, named.part.size)});
         H.middleCols(named.rows.first, named.rows.size) = m.terms.back().H;
       }
-      if (random_.uniform(0.0, 1.0) < 0.5) {
-        corrected.push_back(named.part);
-        corrected_rows.push_back(named.rows);
-      }
+      if (random_.uniform(0.0, 1.0) < 0.5) corrected.push_back(named);
     }
     for (const Scan& scan : scans_) {
       if (random_.uniform(0.0, 1.0) < 0.5) continue;
       m.ranges.push_back({scan.ranges, random_.gaussian(d, scan.rows.size)});
       H.middleCols(scan.rows.first, scan.rows.size) = m.ranges.back().J;
     }
-    const auto corrections = state_.update(m, corrected);
-    const MatrixXd K = all_.update(H, m.noise, corrected_rows);
-    ASSERT_EQ(corrections.size(), corrected.size());
-    for (std::size_t i = 0; i < corrected.size(); ++i) {
-      const auto [first, size] = corrected_rows[i];
-      EXPECT_TRUE(matricesNear(corrections[i], K.middleRows(first, size) * m.residual, 1e-8));
+    const ErrorState::Correlation with_r = state_.correlate(m);
+    const MatrixXd best = all_.gain(H, m.noise);
+    MatrixXd K = MatrixXd::Zero(all_.size(), d);
+    std::vector<ErrorState::Gain> gains;
+    for (const auto& [part, rows] : corrected) {
+      EXPECT_TRUE(matricesNear(with_r.gain(part), best.middleRows(rows.first, rows.size), 1e-8));
+      gains.push_back({part, with_r.gain(part)});
+      if (random_.uniform(0.0, 1.0) < 0.5) gains.back().K += 0.1 * random_.gaussian(rows.size, d);  // any may be taken
+      K.middleRows(rows.first, rows.size) = gains.back().K;
     }
+    state_.update(m, with_r, gains);
+    all_.update(H, m.noise, K);
   }
 
   void forget() {
@@ -148,7 +147,7 @@ class ErrorStateTest : public testing::Test {
   void compare() const {
     for (const Named& a : parts_) {
       for (const Named& b : parts_) {
-        EXPECT_TRUE(matricesClose(state_.covariance(a.part, b.part), all_.block(a.rows, b.rows), 1e-7));
+        EXPECT_TRUE(matricesNear(state_.covariance(a.part, b.part), all_.block(a.rows, b.rows), 1e-9));
       }
       for (const Scan& scan : scans_) {  // by what an innovation sees of both
         Measurement m;

@@ -165,5 +165,33 @@ TEST(OtherMeasurements, OneErrorOfTheWheelsAloneIsEstimatedWhereTheOthersHaveNoS
   EXPECT_TRUE(matricesNear(found.covariance, covariance, 1e-12));
 }
 
+/// A robot that comes by wheels to where it sees first, 30 m on, and then slips by half a radian: what it did is seen
+/// to a centimetre. That tells of the wheels, too, which led the robot all the way.
+TEST(OtherMeasurements, WhatIsLearnedOfTheWheelsDoesNotTurnTheWayBehind) {
+  StateOptions states;
+  states.calibration_std << 0.02, 0.05, 0.05, 0.1;
+  states.calibration_way = 1000.0;
+  MultiCloneFilter filter(SE2(), Eigen::Matrix3d::Zero(), states);
+  const Eigen::Matrix3d Q = Eigen::Vector3d(1e-3, 1e-3, 1e-3).asDiagonal();
+  for (int i = 0; i < 100; ++i) filter.propagate({SE2(0.3, 0.0, 0.01), Q});
+  const Eigen::VectorXd no_ranges(0);
+  filter.clone(no_ranges);
+  const SE2 reference = filter.pose();
+  filter.propagate({SE2(0.7, 0.0, -0.4), 10.0 * Q});
+  Displacement z;
+  z.reference_from_current = SE2(0.7, 0.0, 0.1);
+  z.J_reference = z.J_current = Eigen::MatrixXd::Zero(3, 0);
+  z.variance_reference = z.variance_current = no_ranges;
+  z.matching_noise = 1e-4 * Eigen::Matrix3d::Identity();
+  filter.update(z, filter.innovation(z));
+  EXPECT_GT(filter.calibration().error.cwiseAbs().maxCoeff(), 0.02) << "the slip is no test: nothing is learned";
+  const Eigen::Vector3d off = error(filter.predictedDisplacement().reference_from_current, z.reference_from_current);
+  EXPECT_LT(off.head<2>().norm(), 0.05) << off.transpose();
+  EXPECT_LT(std::abs(off.z()), 0.02);
+  EXPECT_TRUE(matricesNear(between(reference, filter.pose()).vector(),
+                           filter.predictedDisplacement().reference_from_current.vector(), 1e-9))
+      << "the reference has not moved";
+}
+
 }  // namespace
 }  // namespace sckf

@@ -127,6 +127,13 @@ inline ::testing::AssertionResult sound(const Estimate& estimate) {
   return ::testing::AssertionSuccess();
 }
 
+/// Wheels and mount are taken for right.
+inline CalibrationOptions noCalibration() {
+  CalibrationOptions options;
+  options.distance_std = options.rotation_std = options.rotation_per_meter_std = options.laser_ahead_std = 0.0;
+  return options;
+}
+
 inline PipelineOptions withMethod(const std::string& method) {
   PipelineOptions options;
   options.method = method;

@@ -49,7 +49,6 @@ Wheels tooLong() {
 TEST(OtherSensors, WheelsThatAreTooLongAreFoundOut) {
   const SimulatedDrive drive(tooLong(), 31000);
   PipelineOptions options;
-  options.calibration.on = true;
   Driven driven(drive, options);
   driven.odometry(0);
   driven.run(0, 30000);
@@ -65,10 +64,9 @@ TEST(OtherSensors, WheelsThatAreTooLongAreFoundOut) {
 TEST(OtherSensors, WheelsThatHaveBeenFoundOutLeadABlindRobotBetter) {
   const SimulatedDrive drive(tooLong(), 37000);
   PipelineOptions options;
-  options.calibration.distance_std = 0.0;
+  options.calibration = noCalibration();
   const double without = errorAfterBlindStretch(drive, options);
-  options.calibration.distance_std = 0.02;
-  options.calibration.on = true;
+  options.calibration = CalibrationOptions();
   const double with = errorAfterBlindStretch(drive, options);
   EXPECT_GT(without, 0.2) << "the drive is no test: the wheels are good enough";
   EXPECT_LT(with, 0.5 * without);
@@ -92,11 +90,12 @@ double acrossWithLaserAhead(const PipelineOptions& options, double ahead, WheelC
   return sum;
 }
 
-TEST(OtherSensors, ALaserThatIsFartherAheadThanToldIsFoundOut) {
+TEST(OtherSensors, ALaserThatIsFartherAheadThanToldIsFoundOutByDefault) {
   PipelineOptions options;
+  options.calibration = noCalibration();
   WheelCalibration found;
   const double without = acrossWithLaserAhead(options, 0.08, &found);
-  options.calibration.on = true;
+  options.calibration = CalibrationOptions();
   const double with = acrossWithLaserAhead(options, 0.08, &found);
   const double std = std::sqrt(found.covariance(3, 3));
   EXPECT_NEAR(found.error(3), 0.08, 3.0 * std);
@@ -134,7 +133,8 @@ double errorAlongDoors(const PipelineOptions& options, WheelCalibration* found) 
   addDoors(-1.0, random, world);
   Wheels wheels;
   wheels.scale = 1.05;
-  SimulatedDrive drive(wheels, 151000, world, [](double t) { return SE2(0.5 * t, 0.1 * std::sin(t), 0.1 * std::cos(t)); });
+  SimulatedDrive drive(wheels, 151000, world,
+                       [](double t) { return SE2(0.5 * t, 0.1 * std::sin(t), 0.1 * std::cos(t)); });
   drive.laser = frontLaser();
   drive.laser.noise = 0.01;
   drive.laser.range_max = 20.0;
@@ -151,8 +151,6 @@ TEST(OtherSensors, WheelsThatTellTooLongAWayAreFoundOutByDefaultAndACorridorIsNo
   const double with = errorAlongDoors(options, &found);
   EXPECT_NEAR(found.error(0), 1.0 / 1.05 - 1.0, 3.0 * std::sqrt(found.covariance(0, 0)));
   EXPECT_LT(std::sqrt(found.covariance(0, 0)), 0.5 * options.calibration.distance_std);
-  found.covariance(0, 0) = 0.0;
-  EXPECT_TRUE(found.covariance.isZero(0.0)) << "no other is estimated";
   options.calibration.distance_std = 0.0;
   const double without = errorAlongDoors(options, &found);
   EXPECT_GT(without, 0.5) << "the corridor is no test: scans see the way well enough";
@@ -162,7 +160,7 @@ TEST(OtherSensors, WheelsThatTellTooLongAWayAreFoundOutByDefaultAndACorridorIsNo
 TEST(OtherSensors, ACalibrationThatIsOffIsNone) {
   const SimulatedDrive drive(tooLong(), 3000);
   PipelineOptions options;
-  options.calibration.distance_std = 0.0;
+  options.calibration = noCalibration();
   Driven driven(drive, options);
   driven.odometry(0);
   driven.run(0, 2000);
@@ -172,8 +170,7 @@ TEST(OtherSensors, ACalibrationThatIsOffIsNone) {
 TEST(OtherSensors, MethodsWithoutSuchStatesRefuseThemByName) {
   for (const std::string& method : fusionMethodNames()) {
     PipelineOptions options = withMethod(method);
-    const std::vector<std::pair<std::string, bool*>> switches{{"calibrate_odometry", &options.calibration.on},
-                                                              {"use_imu", &options.imu.gyro},
+    const std::vector<std::pair<std::string, bool*>> switches{{"use_imu", &options.imu.gyro},
                                                               {"use_imu_orientation", &options.imu.orientation},
                                                               {"use_pose_updates", &options.pose_updates.on}};
     for (const auto& [parameter, is_on] : switches) {

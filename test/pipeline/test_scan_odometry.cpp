@@ -124,7 +124,7 @@ TEST(ScanOdometry, AReferenceIsKeptOverSeveralScansUnlessTheDistancesAreZero) {
 TEST(ScanOdometry, TheLatestEstimateGoesOnFromTheScansByTheWheels) {
   const SimulatedDrive drive;
   PipelineOptions options;
-  options.calibration.distance_std = 0.0;
+  options.calibration = noCalibration();
   Driven driven(drive, options);
   driven.odometry(0);
   EXPECT_EQ(driven.pipeline.latest()->stamp, at(0));
@@ -156,7 +156,7 @@ Eigen::Matrix3d afterOneStep(const std::optional<Eigen::Matrix3d>& stated, bool 
   const SimulatedDrive drive;
   PipelineOptions options;
   options.prefer_twist_covariance = prefer;
-  options.calibration.distance_std = 0.0;
+  options.calibration = noCalibration();
   ScanOdometry pipeline(options);
   pipeline.addOdometry(drive.odometry(0));
   OdometrySample sample = drive.odometry(20);

@@ -11,11 +11,17 @@
 namespace sckf::test {
 namespace {
 
+/// Nothing is learned of the wheels, so that what they tell is what moves the estimate.
+PipelineOptions wheelsAsTheyAre() {
+  PipelineOptions options;
+  options.calibration = noCalibration();
+  return options;
+}
+
 /// Wheels that are better than the defaults think, so that small contradictions are seen.
 PipelineOptions trustingTheWheels() {
-  PipelineOptions options;
+  PipelineOptions options = wheelsAsTheyAre();
   options.odometry_noise = {0.03, 0.02, 0.05, 0.03};
-  options.calibration.distance_std = 0.0;
   return options;
 }
 
@@ -35,7 +41,7 @@ LaserScan scanElsewhere(const SimulatedDrive& drive, int ms) {
 }
 
 /// A drive of 2 s by the wheels and good scans.
-Driven begun(const SimulatedDrive& drive, const PipelineOptions& options = {}) {
+Driven begun(const SimulatedDrive& drive, const PipelineOptions& options = wheelsAsTheyAre()) {
   Driven driven(drive, options);
   driven.odometry(0);
   driven.run(0, 2000);
@@ -320,12 +326,12 @@ TEST(ScanOdometryFaults, WheelsThatFreezeInASharpTurnAreFoundOut) {
 }
 
 /// The error after a rotation that only the wheels tell of, on a way straight ahead that is 0.2 m from scan to scan.
-Eigen::Vector3d errorAfterYawSlip(const World& world, double slip) {
+Eigen::Vector3d errorAfterYawSlip(const World& world, double slip, const PipelineOptions& options = {}) {
   Wheels wheels;
   wheels.yaw_slip_at = 2050;
   wheels.yaw_slip = slip;
   const SimulatedDrive drive(wheels, 3000, world, [](double t) { return SE2(-2.0 + 0.5 * t, 0.2, 0.1); });
-  Driven driven(drive);
+  Driven driven(drive, options);
   driven.odometry(0);
   driven.run(0, 2980, 400);
   return driven.latestError(2980);
@@ -344,6 +350,10 @@ TEST(ScanOdometryFaults, InACorridorTooWhichDoesNotTellTheWayAlongIt) {
   EXPECT_LT(std::abs(e.y()), 0.04) << e.transpose();
   EXPECT_LT(std::abs(e.z()), 0.02) << e.transpose();
   EXPECT_LT(std::abs(e.x()), 0.3) << "the wheels tell as much: " << e.transpose();
+  PipelineOptions options;
+  options.gate.slip_min_overlap = 1.1;  // of two directions
+  EXPECT_GT(std::abs(errorAfterYawSlip(corridor(), 0.6, options).z()), 0.3) << "such scans were not to be trusted";
+  EXPECT_LT(std::abs(errorAfterYawSlip(room(), 0.6, options).z()), 0.02) << "but where they see all, they are";
 }
 
 TEST(ScanOdometryFaults, WheelsThatCanSlipInYawAloneLeaveTheEstimateSound) {
@@ -395,13 +405,11 @@ TEST(ScanOdometryFaults, ScansThatAreNotTrustedOnSlipAreGated) {
 /// A slip is believed only of scans that match well.
 TEST(ScanOdometryFaults, APoorMatchIsNoSlip) {
   const SimulatedDrive drive = slippingDrive();
-  for (const bool by_agreement : {true, false}) {
-    PipelineOptions options;
-    if (by_agreement) {
-      options.gate.slip_min_agreement = 1.1;
-    } else {
-      options.gate.slip_max_residual = 1e-3;
-    }
+  PipelineOptions by_agreement;
+  by_agreement.gate.slip_min_agreement = 1.1;
+  PipelineOptions by_residual;
+  by_residual.gate.slip_max_residual = 1e-3;
+  for (const PipelineOptions& options : {by_agreement, by_residual}) {
     Driven driven = begun(drive, options);
     driven.run(kSlipFrom, kSlipTo);
     EXPECT_EQ(driven.count(ScanOutcome::kSlip), 0U);

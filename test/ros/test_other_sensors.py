@@ -72,7 +72,7 @@ class OtherSensors(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.recorder = helpers.Recorder(in_map=True)
-        cls.loader = helpers.load_nodelet(MANAGER, NODE, max_scan_delay=10000, calibrate_odometry=True, use_imu=True,
+        cls.loader = helpers.load_nodelet(MANAGER, NODE, max_scan_delay=10000, use_imu=True,
                                           use_imu_orientation=True, imu_orientation_std=0.02, standstill_time=1.0,
                                           odometry_yaw_per_meter=0.05, use_pose_updates=True, publish_map_tf=True)
         helpers.wait_for_subscriber('/scan')

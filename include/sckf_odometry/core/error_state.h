@@ -67,11 +67,16 @@ class ErrorState {
   };
   Correlation correlate(const Measurement& measurement) const;
 
+  /// A part is corrected by K r: best by K of the Correlation, but any other is allowed for in the covariance.
+  struct Gain {
+    Part part;
+    Eigen::MatrixXd K;  ///< size × d
+  };
+
   /// Schmidt update: some parts are corrected, all others and the ranges are considered, so that their covariance among
-  /// themselves stays. Time of order N² + N Σq + q M, with the M ranges of the scans that it is by, and q ≤ 2N directions
-  /// of each scan's noise that are correlated with the state. Returns what each of the corrected parts is to be
-  /// corrected by.
-  std::vector<Eigen::VectorXd> update(const Measurement& measurement, const std::vector<Part>& corrected);
+  /// themselves stays. Time of order N² + N Σq + q M, with the M ranges of the scans that it is by, and q ≤ 2N
+  /// directions of each scan's noise that are correlated with the state. with_r: correlate(measurement).
+  void update(const Measurement& measurement, const Correlation& with_r, const std::vector<Gain>& gains);
 
  private:
   /// E{z̃ x̃ᵀ} = D C: measurements correlate the noise of the ranges with the state by few directions of it.
@@ -83,7 +88,6 @@ class ErrorState {
 
   Part place(Index size);
   static Eigen::MatrixXd coordinates(const RangeNoise& noise, const Measurement& measurement);
-  static Eigen::MatrixXd correlate(const RangeNoise& noise, Ranges scan, const Measurement& measurement);
   static void addDirections(RangeNoise& noise, const Eigen::MatrixXd& directions, const Eigen::MatrixXd& coordinates);
 
   Eigen::MatrixXd P_;       // N × N; rows of no part are zero

@@ -80,7 +80,7 @@ class MultiCloneFilter : public LandmarkStates {
   OdometryIncrement calibrated(const OdometryIncrement& increment) const;
   Eigen::MatrixXd calibrationCovarianceAtFirst() const;
   Eigen::Matrix3Xd byCalibration(const SE2& motion) const;
-  void forgetCalibration(double way);
+  void forgetCalibration();
   void measureMotion(const OdometryIncrement& motion, const Eigen::Matrix3d& W);
   Measurement measurement(const Displacement& displacement, const Innovation& innovation) const;
   Measurement measurement(std::size_t landmark, const Sighting& sighting) const;
@@ -88,8 +88,13 @@ class MultiCloneFilter : public LandmarkStates {
 
   std::vector<Part> statesNotCloned() const;
   std::vector<Part> allStates() const;
-  /// Returns by what, part for part.
-  std::vector<Eigen::VectorXd> correct(const Measurement& measurement, const std::vector<Part>& parts);
+  /// anchor: a pose that stays where it is, whatever is learned of the wheels. Returns by what, part for part.
+  std::vector<Eigen::VectorXd> correct(const Measurement& measurement, const std::vector<Part>& parts,
+                                       const std::optional<Part>& anchor);
+  std::vector<ErrorState::Gain> gains(const ErrorState::Correlation& with_r, const std::vector<Part>& parts,
+                                      const std::optional<Part>& anchor) const;
+  Eigen::MatrixXd learnedOf(const Part& anchor, const ErrorState::Correlation& with_r) const;
+  bool isPlace(const Part& part) const;
 
   StateOptions options_;
   ErrorState errors_;
@@ -103,7 +108,8 @@ class MultiCloneFilter : public LandmarkStates {
   Eigen::Vector4d calibration_ = Eigen::Vector4d::Zero();
   Eigen::Matrix4Xd calibrated_;  // a column of the identity for each of the four that is estimated
   std::optional<Part> calibration_error_;
-  double gyro_bias_ = 0.0;  // [rad/s]
+  double way_to_forget_ = 0.0;  // [m] since some of it was forgotten
+  double gyro_bias_ = 0.0;      // [rad/s]
   std::optional<Part> gyro_bias_error_;
   double compass_from_world_ = 0.0;  // [rad]
   std::optional<Part> compass_error_;

@@ -7,15 +7,14 @@
 
 namespace sckf {
 
-/// Systematic errors of the wheels as states, which scans find where they tell the motion. See WheelCalibration. Only
-/// method sckf_multi has them.
+/// Systematic errors of the wheels as states, which scans find where they tell the motion: how large they can be, 0:
+/// there is none. See WheelCalibration. Only method sckf_multi has them.
 struct CalibrationOptions {
-  double distance_std = 0.02;            ///< how large the error of the way can be, as a share of it; 0: it has none
-  bool on = false;                       ///< there are others …
-  double rotation_std = 0.05;            ///< … that of a rotation, as large …
-  double rotation_per_meter_std = 0.05;  ///< [rad/m] … the rotation that goes with the way …
-  double laser_ahead_std = 0.1;  ///< [m] … and how much farther ahead the laser is of where the wheels turn about
-  double way = 1000.0;           ///< [m] within which they are forgotten
+  double distance_std = 0.02;            ///< of the way, as a share of it
+  double rotation_std = 0.05;            ///< of a rotation, as a share of it
+  double rotation_per_meter_std = 0.05;  ///< [rad/m] the rotation that goes with the way
+  double laser_ahead_std = 0.1;          ///< [m] how much farther ahead the laser is of where the wheels turn about
+  double way = 1000.0;                   ///< [m] within which they are forgotten
 };
 
 /// What an IMU is used for, and how far it is trusted.

@@ -32,7 +32,8 @@ struct GateOptions {
   double slip_std_translation = 0.5;  ///< [m] what the wheels may have been wrong by in such an interval …
   double slip_std_yaw = 0.5;          ///< [rad] … and in yaw
   double slip_min_agreement = 0.7;    ///< scans match well if they agree by at least so much …
-  double slip_max_residual = 3.0;     ///< … and the weighted residuals are at most this
+  double slip_max_residual = 3.0;     ///< … the weighted residuals are at most this …
+  double slip_min_overlap = 0.6;  ///< … and where they see two directions only, this share of the points has a partner
 };
 
 struct PipelineOptions {
