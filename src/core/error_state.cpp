@@ -56,12 +56,11 @@ ErrorState::Ranges ErrorState::addRanges(const Eigen::VectorXd& variances) {
 }
 
 void ErrorState::move(Part part, const MatrixXd& B, Part by) {
-  const MatrixXd of_part = B * P_.middleRows(by.row, by.size);
-  P_.middleRows(part.row, part.size) += of_part;
+  P_.middleRows(part.row, part.size) += B * P_.middleRows(by.row, by.size);
   P_.middleCols(part.row, part.size) += P_.middleCols(by.row, by.size) * B.transpose();
   for (auto& [scan, noise] : ranges_) {
-    auto to = noise.coordinates.middleCols(part.row, part.size);
-    to += noise.coordinates.middleCols(by.row, by.size).lazyProduct(B.transpose());
+    noise.coordinates.middleCols(part.row, part.size) +=
+        noise.coordinates.middleCols(by.row, by.size).lazyProduct(B.transpose());
   }
 }
 

@@ -354,7 +354,7 @@ MatrixXd MultiCloneFilter::learnedOf(const Part& anchor, const ErrorState::Corre
   MatrixXd learned = MatrixXd::Zero(anchor.size, with_r.innovation.cols());
   for (const auto& part : {calibration_error_, gyro_bias_error_}) {
     if (!part) continue;
-    const MatrixXd by_wheels = errors_.covariance(*part).llt().solve(errors_.covariance(*part, anchor)).transpose();
+    const MatrixXd by_wheels = errors_.covariance(*part).ldlt().solve(errors_.covariance(*part, anchor)).transpose();
     learned += by_wheels * with_r.gain(*part);
   }
   return learned;

@@ -17,6 +17,13 @@ namespace {
 using MatrixDD = Displacement::MatrixDD;
 using MatrixD3 = Displacement::MatrixD3;
 
+/// ∂²L/∂x² of one residual.
+Eigen::Matrix3d hessianOf(const RobustKernel& kernel, const Residual& residual, const ResidualTerms& t) {
+  Eigen::Matrix3d hessian = kernel.slope(t.e) * t.A * t.A.transpose();
+  hessian(2, 2) -= kernel.influence(t.e) / residual.std * residual.normal.dot(t.lever);
+  return hessian;
+}
+
 /// Derivatives of the loss by the displacement, at one of a search.
 struct LossSlope {
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
@@ -27,12 +34,9 @@ struct LossSlope {
     const RigidMotion motion(x);
     for (const Residual& residual : problem.residuals()) {
       const ResidualTerms t = problem.terms(residual, motion);
-      const double influence = problem.kernel().influence(t.e);
-      const Eigen::Matrix3d square = t.A * t.A.transpose();
-      gradient += influence * t.A;
-      information += problem.kernel().weight(t.e) * square;
-      hessian += problem.kernel().slope(t.e) * square;
-      hessian(2, 2) -= influence / residual.std * residual.normal.dot(t.lever);
+      gradient += problem.kernel().influence(t.e) * t.A;
+      information += problem.kernel().weight(t.e) * t.A * t.A.transpose();
+      hessian += hessianOf(problem.kernel(), residual, t);
     }
   }
 };
@@ -102,8 +106,7 @@ void addDerivatives(const AlignmentProblem& problem, const Residual& residual, c
                     const ResidualTerms& t, LossDerivatives& out) {
   const double influence = problem.kernel().influence(t.e);
   const double slope = problem.kernel().slope(t.e);
-  Eigen::Matrix3d hessian = slope * t.A * t.A.transpose();
-  hessian(2, 2) -= influence / residual.std * residual.normal.dot(t.lever);
+  const Eigen::Matrix3d hessian = hessianOf(problem.kernel(), residual, t);
   out.hessian += hessian;
   out.blocks.back().hessian += hessian;
   out.blocks.back().gradient += influence * t.A;

@@ -147,7 +147,7 @@ class ErrorStateTest : public testing::Test {
   void compare() const {
     for (const Named& a : parts_) {
       for (const Named& b : parts_) {
-        EXPECT_TRUE(matricesNear(state_.covariance(a.part, b.part), all_.block(a.rows, b.rows), 1e-9));
+        EXPECT_TRUE(matricesNear(state_.covariance(a.part, b.part), all_.block(a.rows, b.rows), 1e-12));
       }
       for (const Scan& scan : scans_) {  // by what an innovation sees of both
         Measurement m;

@@ -143,19 +143,24 @@ TEST(OtherMeasurements, TheCalibrationForgetsAndNeverRunsAway) {
   EXPECT_NEAR(filter.calibration().covariance(0, 0), 0.01, 1e-4) << "as uncertain as at the start, and no more";
 }
 
+/// And to a hundredth of a radian, by matching noise alone.
+Displacement seenToACentimetre(const SE2& reference_from_current) {
+  Displacement z;
+  z.reference_from_current = reference_from_current;
+  z.J_reference = z.J_current = Eigen::MatrixXd::Zero(3, 0);
+  z.variance_reference = z.variance_current = Eigen::VectorXd(0);
+  z.matching_noise = 1e-4 * Eigen::Matrix3d::Identity();
+  return z;
+}
+
 TEST(OtherMeasurements, OneErrorOfTheWheelsAloneIsEstimatedWhereTheOthersHaveNoStd) {
   StateOptions states;
   states.calibration_std(2) = 0.05;  // [rad/m]
   states.calibration_way = 1e12;
   MultiCloneFilter filter(SE2(), Eigen::Matrix3d::Zero(), states);
-  const Eigen::VectorXd no_ranges(0);
-  filter.clone(no_ranges);
+  filter.clone(Eigen::VectorXd(0));
   filter.propagate({SE2(1.0, 0.0, 0.0), 4e-4 * Eigen::Matrix3d::Identity()});
-  Displacement z;
-  z.reference_from_current = SE2(1.0, 0.0, 0.04);
-  z.J_reference = z.J_current = Eigen::MatrixXd::Zero(3, 0);
-  z.variance_reference = z.variance_current = no_ranges;
-  z.matching_noise = 1e-4 * Eigen::Matrix3d::Identity();
+  const Displacement z = seenToACentimetre(SE2(1.0, 0.0, 0.04));
   filter.update(z, filter.innovation(z));
   const double gain = 25e-4 / (25e-4 + 4e-4 + 1e-4);  // of a yaw that is k times 1 m, and noise
   const WheelCalibration found = filter.calibration();
@@ -174,15 +179,10 @@ TEST(OtherMeasurements, WhatIsLearnedOfTheWheelsDoesNotTurnTheWayBehind) {
   MultiCloneFilter filter(SE2(), Eigen::Matrix3d::Zero(), states);
   const Eigen::Matrix3d Q = Eigen::Vector3d(1e-3, 1e-3, 1e-3).asDiagonal();
   for (int i = 0; i < 100; ++i) filter.propagate({SE2(0.3, 0.0, 0.01), Q});
-  const Eigen::VectorXd no_ranges(0);
-  filter.clone(no_ranges);
+  filter.clone(Eigen::VectorXd(0));
   const SE2 reference = filter.pose();
   filter.propagate({SE2(0.7, 0.0, -0.4), 10.0 * Q});
-  Displacement z;
-  z.reference_from_current = SE2(0.7, 0.0, 0.1);
-  z.J_reference = z.J_current = Eigen::MatrixXd::Zero(3, 0);
-  z.variance_reference = z.variance_current = no_ranges;
-  z.matching_noise = 1e-4 * Eigen::Matrix3d::Identity();
+  const Displacement z = seenToACentimetre(SE2(0.7, 0.0, 0.1));
   filter.update(z, filter.innovation(z));
   EXPECT_GT(filter.calibration().error.cwiseAbs().maxCoeff(), 0.02) << "the slip is no test: nothing is learned";
   const Eigen::Vector3d off = error(filter.predictedDisplacement().reference_from_current, z.reference_from_current);
