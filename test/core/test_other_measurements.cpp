@@ -193,5 +193,41 @@ TEST(OtherMeasurements, WhatIsLearnedOfTheWheelsDoesNotTurnTheWayBehind) {
       << "the reference has not moved";
 }
 
+/// Ranges that several displacements share tell of clones, too, and of one along a corridor's unseen way all too much.
+TEST(OtherMeasurements, DisplacementsOfWheelsThatErrLeaveTheAnchorWhereItIs) {
+  StateOptions states;
+  states.calibration_std << 0.02, 0.05, 0.05, 0.1;
+  states.calibration_way = 1000.0;
+  MultiCloneFilter filter(SE2(), Eigen::Matrix3d::Zero(), states);
+  const Eigen::VectorXd R = Eigen::VectorXd::Constant(2, 1e-4);
+  const auto across = [&R](std::size_t clone, const SE2& reference_from_current) {
+    Displacement z;
+    z.clone = clone;
+    z.reference_from_current = reference_from_current;
+    z.observable = Eigen::Matrix3d::Identity().bottomRows<2>();
+    z.J_reference = (Eigen::Matrix2d() << -1.0, 0.2, 0.1, 0.3).finished();
+    z.J_current = (Eigen::Matrix2d() << 1.0, 0.1, -0.2, 0.3).finished();
+    z.variance_reference = z.variance_current = R;
+    z.matching_noise = 1e-6 * Eigen::Matrix2d::Identity();
+    return z;
+  };
+  for (int scan = 0; scan < 6; ++scan) {
+    SCOPED_TRACE("scan " + std::to_string(scan));
+    filter.propagate({SE2(0.5, 0.02, 0.03), 1e-3 * Eigen::Matrix3d::Identity()});
+    filter.beginScan();
+    for (std::size_t clone = 0; scan > 0 && clone < filter.clones(); ++clone) {
+      const std::size_t anchor = clone == 0 ? 0 : filter.clones() - 1;
+      const SE2 before = filter.clonedPose(anchor);
+      const SE2 pose = filter.pose();
+      const SE2 predicted = filter.predictedDisplacementFrom(clone).reference_from_current;
+      const Displacement z = across(clone, compose(predicted, SE2(0.0, 0.01, 0.01)));
+      filter.update(z, filter.innovation(z));
+      EXPECT_TRUE(matricesNear(filter.clonedPose(anchor).vector(), before.vector(), 1e-9)) << "clone " << clone;
+      EXPECT_GT(error(filter.pose(), pose).norm(), 1e-4) << "a displacement that corrects nothing is no test";
+    }
+    filter.clone(R);
+  }
+}
+
 }  // namespace
 }  // namespace sckf

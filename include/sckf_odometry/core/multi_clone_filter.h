@@ -88,12 +88,11 @@ class MultiCloneFilter : public LandmarkStates {
 
   std::vector<Part> statesNotCloned() const;
   std::vector<Part> allStates() const;
-  /// anchor: a pose that stays where it is, whatever is learned of the wheels. Returns by what, part for part.
+  /// anchor: a pose that stays where it is, see gains(). Returns by what, part for part.
   std::vector<Eigen::VectorXd> correct(const Measurement& measurement, const std::vector<Part>& parts,
                                        const std::optional<Part>& anchor);
   std::vector<ErrorState::Gain> gains(const ErrorState::Correlation& with_r, const std::vector<Part>& parts,
                                       const std::optional<Part>& anchor) const;
-  Eigen::MatrixXd learnedOf(const Part& anchor, const ErrorState::Correlation& with_r) const;
   bool isPlace(const Part& part) const;
 
   StateOptions options_;
