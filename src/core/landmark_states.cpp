@@ -65,7 +65,8 @@ Innovation MultiCloneFilter::innovation(std::size_t landmark, const Sighting& si
 }
 
 void MultiCloneFilter::update(std::size_t landmark, const Sighting& sighting) {
-  correct(measurement(landmark, sighting), allStates(), clones_.back().error);
+  const Measurement m = measurement(landmark, sighting);
+  correct(m, errors_.correlate(m), allStates(), clones_.back().error);
 }
 
 }  // namespace sckf

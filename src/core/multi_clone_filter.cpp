@@ -148,7 +148,8 @@ void MultiCloneFilter::measureMotion(const OdometryIncrement& increment, const M
   std::vector<Part> parts = statesNotCloned();
   parts.push_back(noise_error);
   for (const MotionMeasurement& z : increment.measured) {
-    noise += correct(measurement(z, noise, noise_error), parts, clones_.front().error).back();
+    const Measurement m = measurement(z, noise, noise_error);
+    noise += correct(m, errors_.correlate(m), parts, clones_.front().error).back();
   }
   errors_.remove(noise_error);
 }
@@ -242,7 +243,8 @@ ErrorState::Measurement MultiCloneFilter::measurement(const Displacement& z, con
 void MultiCloneFilter::update(const Displacement& z, const Innovation& r) {
   if (!present_) present_ = errors_.addRanges(z.variance_current);
   const bool newest = z.clone == 0;
-  correct(measurement(z, r), newest ? statesNotCloned() : allStates(),
+  const Measurement m = measurement(z, r);
+  correct(m, errors_.correlate(m), newest ? statesNotCloned() : allStates(),
           newest ? clones_.front().error : clones_.back().error);  // (22)(23)
 }
 
@@ -297,9 +299,9 @@ double MultiCloneFilter::updateHeading(double yaw, double variance, double nis_b
 }
 
 double MultiCloneFilter::update(const Measurement& m, double nis_bound) {
-  const MatrixXd S = errors_.correlate(m).innovation;
-  const double nis = m.residual.dot(S.llt().solve(m.residual));
-  if (nis <= nis_bound) correct(m, allStates(), std::nullopt);
+  const ErrorState::Correlation with_r = errors_.correlate(m);
+  const double nis = m.residual.dot(with_r.innovation.llt().solve(m.residual));
+  if (nis <= nis_bound) correct(m, with_r, allStates(), std::nullopt);
   return nis;
 }
 
@@ -368,9 +370,10 @@ std::vector<ErrorState::Gain> MultiCloneFilter::gains(const ErrorState::Correlat
   return gains;
 }
 
-std::vector<Eigen::VectorXd> MultiCloneFilter::correct(const Measurement& measurement, const std::vector<Part>& parts,
+std::vector<Eigen::VectorXd> MultiCloneFilter::correct(const Measurement& measurement,
+                                                       const ErrorState::Correlation& with_r,
+                                                       const std::vector<Part>& parts,
                                                        const std::optional<Part>& anchor) {
-  const ErrorState::Correlation with_r = errors_.correlate(measurement);
   const std::vector<ErrorState::Gain> gains = this->gains(with_r, parts, anchor);
   errors_.update(measurement, with_r, gains);
   std::vector<Eigen::VectorXd> corrections;

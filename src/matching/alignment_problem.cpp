@@ -10,7 +10,7 @@ namespace {
 
 double square(double v) { return v * v; }
 
-/// From a to b, both of length 1: the sine.
+/// From a to b, both of length 1: the sine, which is the angle for turns that matter, and a little less for others.
 double turnBetween(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return quarterTurn(a).dot(b); }
 
 /// From point i to the nearer of its neighbours in the order of the beams.

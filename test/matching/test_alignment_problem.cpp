@@ -77,15 +77,15 @@ TEST(AlignmentProblem, WhatStandsWhereTheOtherScanLookedThroughContradicts) {
   }
 }
 
-TEST(AlignmentProblem, WhatTheOtherScanCannotSeeDoesNotContradict) {
-  const World world = roomWithBoard(true);
+std::shared_ptr<const PreparedScan> roomWithBoardFrom(const SE2& pose) {
   const SimulatedLaser front = frontLaser();
-  const auto from = [&](const SE2& pose) {
-    return prepareScan(simulateScan(world, pose, front), front.base_from_laser, {});
-  };
-  const auto reference = from(SE2());
+  return prepareScan(simulateScan(roomWithBoard(true), pose, front), front.base_from_laser, {});
+}
+
+TEST(AlignmentProblem, WhatTheOtherScanCannotSeeDoesNotContradict) {
+  const auto reference = roomWithBoardFrom(SE2());
   for (const SE2& place : {SE2(-1.5, 0.0, 0.0), SE2(-0.5, 1.0, 0.9), SE2(0.5, -1.5, -0.7)}) {  // back, and turned
-    const auto current = from(place);
+    const auto current = roomWithBoardFrom(place);
     const AlignmentProblem problem(*reference, *current, place, 0.2, PairOptions());
     EXPECT_LT(problem.overlap(), 0.8) << place.vector().transpose();
     EXPECT_GT(problem.agreement(), 0.98) << place.vector().transpose();
@@ -93,14 +93,9 @@ TEST(AlignmentProblem, WhatTheOtherScanCannotSeeDoesNotContradict) {
 }
 
 TEST(AlignmentProblem, WhatTheOtherScanCannotSeeCostsNoMoreThanWhatItSees) {
-  const World world = roomWithBoard(true);
-  const SimulatedLaser front = frontLaser();
-  const auto from = [&](const SE2& pose) {
-    return prepareScan(simulateScan(world, pose, front), front.base_from_laser, {});
-  };
   const SE2 back(-1.0, 0.0, 0.0);
-  const auto reference = from(SE2());
-  const auto current = from(back);
+  const auto reference = roomWithBoardFrom(SE2());
+  const auto current = roomWithBoardFrom(back);
   const auto costAt = [&](const SE2& x) {
     return AlignmentProblem(*reference, *current, x, 0.2, PairOptions()).cost(x) / static_cast<double>(current->size());
   };

@@ -89,8 +89,8 @@ class MultiCloneFilter : public LandmarkStates {
   std::vector<Part> statesNotCloned() const;
   std::vector<Part> allStates() const;
   /// anchor: a pose that stays where it is, see gains(). Returns by what, part for part.
-  std::vector<Eigen::VectorXd> correct(const Measurement& measurement, const std::vector<Part>& parts,
-                                       const std::optional<Part>& anchor);
+  std::vector<Eigen::VectorXd> correct(const Measurement& measurement, const ErrorState::Correlation& with_r,
+                                       const std::vector<Part>& parts, const std::optional<Part>& anchor);
   std::vector<ErrorState::Gain> gains(const ErrorState::Correlation& with_r, const std::vector<Part>& parts,
                                       const std::optional<Part>& anchor) const;
   bool isPlace(const Part& part) const;
