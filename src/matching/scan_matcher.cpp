@@ -158,12 +158,12 @@ class Search {
     if (other && (!best || cost(*other) < cost(*best))) best.emplace(std::move(*other));
   }
 
-  /// Whether a place far from the prediction explains clearly more of the points than one near it, or agrees better
-  /// than one that is far, too.
+  /// Whether a place far from the prediction is better than what else there is: than one near the prediction if it
+  /// explains clearly more of the points, than one that is far, too, if it agrees better as well.
   bool better(const Alignment& far, const Alignment& best) const {
     const bool near = best.surprise <= kSurprise;
-    const double gain = near ? kGain * static_cast<double>(current_.size()) : 0.0;
-    return far.cost() + gain < best.cost() && (near || far.agreement > best.agreement + kAgreesBetter);
+    if (near) return far.cost() + kGain * static_cast<double>(current_.size()) < best.cost();
+    return far.cost() < best.cost() && far.agreement > best.agreement + kAgreesBetter;
   }
 
   bool fits(const Alignment& alignment) const {

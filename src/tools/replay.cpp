@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <boost/program_options.hpp>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <deque>
-#include <fstream>
 #include <iostream>
 #include <map>
 #include <stdexcept>
@@ -22,6 +22,7 @@
 #include "sckf_odometry/ros/range_message.h"
 #include "sckf_odometry/ros/tf_input.h"
 #include "sckf_odometry/tools/progress_bar.h"
+#include "sckf_odometry/tools/replay_tables.h"
 
 namespace sckf {
 
@@ -41,120 +42,6 @@ struct Arguments {
   double start = 0.0;     ///< [s] after the bag's begin
   double duration = 0.0;  ///< [s], 0: to its end
 };
-
-/// A file that is complete or not there: it gets its name when everything has been written.
-class OutputFile {
- public:
-  explicit OutputFile(const std::string& path) : path_(path) {
-    if (path_.empty()) return;
-    file_ = std::fopen((path_ + ".part").c_str(), "w");
-    if (file_ == nullptr) throw std::runtime_error(path_ + ": cannot be written");
-  }
-  OutputFile(const OutputFile&) = delete;
-  OutputFile& operator=(const OutputFile&) = delete;
-  ~OutputFile() {
-    if (file_ != nullptr) std::fclose(file_);
-  }
-
-  explicit operator bool() const { return file_ != nullptr; }
-
-  template <typename... Values>
-  void print(const char* format, Values... values) {
-    std::fprintf(file_, format, values...);
-  }
-
-  void finish() {
-    if (file_ == nullptr) return;
-    const bool failed = std::ferror(file_) != 0;
-    const bool closed = std::fclose(file_) == 0;
-    file_ = nullptr;
-    if (failed || !closed || std::rename((path_ + ".part").c_str(), path_.c_str()) != 0) {
-      throw std::runtime_error(path_ + ": cannot be written");
-    }
-  }
-
- private:
-  std::string path_;
-  std::FILE* file_ = nullptr;
-};
-
-/// The stamp in seconds, digit for digit.
-std::string decimal(Stamp stamp) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%lld.%09lld", static_cast<long long>(stamp.count() / 1000000000),
-                static_cast<long long>(stamp.count() % 1000000000));
-  return text;
-}
-
-void writeTumLine(OutputFile& file, Stamp stamp, const SE2& pose) {
-  file.print("%s %.9f %.9f 0 0 0 %.12f %.12f\n", decimal(stamp).c_str(), pose.x, pose.y, std::sin(0.5 * pose.yaw),
-             std::cos(0.5 * pose.yaw));
-}
-
-void writeCsvHeader(OutputFile& file) {
-  file.print(
-      "stamp,x,y,yaw,var_x,cov_xy,cov_xyaw,var_y,cov_yyaw,var_yaw,"
-      "reference_stamp,predicted_x,predicted_y,predicted_yaw,displacement_x,displacement_y,displacement_yaw,dimension,"
-      "displacement_var_x,displacement_cov_xy,displacement_cov_xyaw,displacement_var_y,displacement_cov_yyaw,"
-      "displacement_var_yaw,innovation_1,innovation_2,innovation_3,nis,"
-      "normalised_x,normalised_y,normalised_yaw,pairs,overlap,agreement,residual_rms,new_reference,outcome,reason\n");
-}
-
-void writePose(OutputFile& file, const SE2& pose) { file.print(",%.9f,%.9f,%.9f", pose.x, pose.y, pose.yaw); }
-
-void writeCovariance(OutputFile& file, const Eigen::Matrix3d& P) {
-  file.print(",%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", P(0, 0), P(0, 1), P(0, 2), P(1, 1), P(1, 2), P(2, 2));
-}
-
-void writeEmpty(OutputFile& file, Eigen::Index columns) {
-  for (Eigen::Index i = 0; i < columns; ++i) file.print(",");
-}
-
-/// The innovation by x, y, yaw, each divided by its std; only where all of them are seen.
-void writeNormalised(OutputFile& file, const Displacement& z, const Innovation& innovation) {
-  if (z.dimension() < 3) return writeEmpty(file, 3);
-  const Eigen::Matrix3d by_pose = Eigen::Matrix3d(z.observable).inverse();
-  const Eigen::Vector3d r = by_pose * innovation.residual;
-  const Eigen::Vector3d variance = (by_pose * innovation.covariance * by_pose.transpose()).diagonal();
-  for (Eigen::Index i = 0; i < 3; ++i) file.print(",%.9g", r(i) / std::sqrt(variance(i)));
-}
-
-/// Its covariance by x, y, yaw only where all of them are seen.
-void writeDisplacement(OutputFile& file, const ScanReport& report) {
-  const Displacement& z = *report.match.displacement;
-  file.print(",%s", decimal(report.reference_stamp).c_str());
-  writePose(file, report.prediction.reference_from_current);
-  writePose(file, z.reference_from_current);
-  file.print(",%d", static_cast<int>(z.dimension()));
-  if (z.dimension() == 3) {
-    const Eigen::Matrix3d by_pose = Eigen::Matrix3d(z.observable).inverse();
-    writeCovariance(file, by_pose * z.covariance() * by_pose.transpose());
-  } else {
-    writeEmpty(file, 6);
-  }
-  for (Eigen::Index i = 0; i < z.dimension(); ++i) file.print(",%.9g", report.innovation->residual(i));
-  writeEmpty(file, 3 - z.dimension());
-  file.print(",%.9g", report.innovation->nis());
-  writeNormalised(file, z, *report.innovation);
-}
-
-void writeCsvLine(OutputFile& file, const ScanReport& report) {
-  file.print("%s", decimal(report.stamp).c_str());
-  if (report.estimate) {
-    writePose(file, report.estimate->odom_from_base);
-    writeCovariance(file, report.estimate->covariance);
-  } else {
-    writeEmpty(file, 9);
-  }
-  if (report.innovation) {
-    writeDisplacement(file, report);
-  } else {
-    writeEmpty(file, 21);
-  }
-  file.print(",%zu,%.6f,%.6f,%.6f,%d,%s,\"%s\"\n", report.match.pairs.size(), report.match.overlap,
-             report.match.agreement, report.match.residual_rms, report.new_reference ? 1 : 0,
-             toString(report.outcome).c_str(), report.reason.c_str());
-}
 
 /// Times of the scans' processing, and what became of them.
 class Statistics {
