@@ -1,7 +1,6 @@
 #include "sckf_odometry/core/multi_clone_filter.h"
 
 #include <Eigen/Cholesky>
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -343,11 +342,16 @@ std::vector<ErrorState::Part> MultiCloneFilter::allStates() const {
   return parts;
 }
 
-/// Whether a part is the error of a pose, a clone or a landmark: one of the world.
-bool MultiCloneFilter::isPlace(const Part& part) const {
-  const auto is_of = [&part](const auto& state) { return state.error.row == part.row; };
-  return part.row == pose_error_.row || std::any_of(clones_.begin(), clones_.end(), is_of) ||
-         std::any_of(landmarks_.begin(), landmarks_.end(), is_of);
+/// The pose, clone or landmark whose error a part is; null if it is that of another state.
+SE2* MultiCloneFilter::placeOf(const Part& part) {
+  if (part.row == pose_error_.row) return &pose_;
+  for (Clone& clone : clones_) {
+    if (part.row == clone.error.row) return &clone.pose;
+  }
+  for (Landmark& landmark : landmarks_) {
+    if (part.row == landmark.error.row) return &landmark.pose;
+  }
+  return nullptr;
 }
 
 /// Those that are best, but for one thing: with systematic errors in the state a displacement corrects where poses are
@@ -358,14 +362,14 @@ bool MultiCloneFilter::isPlace(const Part& part) const {
 /// corrected.
 std::vector<ErrorState::Gain> MultiCloneFilter::gains(const ErrorState::Correlation& with_r,
                                                       const std::vector<Part>& parts,
-                                                      const std::optional<Part>& anchor) const {
+                                                      const std::optional<Part>& anchor) {
   std::vector<ErrorState::Gain> gains;
   gains.reserve(parts.size());
   for (const Part& part : parts) gains.push_back({part, with_r.gain(part)});
   if (!anchor || !(calibration_error_ || gyro_bias_error_)) return gains;
   const MatrixXd of_anchor = with_r.gain(*anchor);
   for (auto& [part, K] : gains) {
-    if (isPlace(part)) K -= of_anchor;
+    if (placeOf(part) != nullptr) K -= of_anchor;
   }
   return gains;
 }
@@ -378,19 +382,13 @@ std::vector<Eigen::VectorXd> MultiCloneFilter::correct(const Measurement& measur
   errors_.update(measurement, with_r, gains);
   std::vector<Eigen::VectorXd> corrections;
   corrections.reserve(parts.size());
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    const Eigen::VectorXd& c = corrections.emplace_back(gains[i].K * measurement.residual);
-    const auto is = [&](const std::optional<Part>& part) { return part && part->row == parts[i].row; };
-    if (is(pose_error_)) pose_ = compose(exponential(c), pose_);
+  for (const auto& [part, K] : gains) {
+    const Eigen::VectorXd& c = corrections.emplace_back(K * measurement.residual);
+    const auto is = [row = part.row](const std::optional<Part>& other) { return other && other->row == row; };
+    if (SE2* place = placeOf(part)) *place = compose(exponential(c), *place);
     if (is(calibration_error_)) calibration_ += calibrated_ * c;
     if (is(gyro_bias_error_)) gyro_bias_ += c(0);
     if (is(compass_error_)) compass_from_world_ += c(0);
-    for (Clone& clone : clones_) {
-      if (is(clone.error)) clone.pose = compose(exponential(c), clone.pose);
-    }
-    for (Landmark& landmark : landmarks_) {
-      if (is(landmark.error)) landmark.pose = compose(exponential(c), landmark.pose);
-    }
   }
   return corrections;
 }

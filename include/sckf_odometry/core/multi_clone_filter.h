@@ -92,8 +92,8 @@ class MultiCloneFilter : public LandmarkStates {
   std::vector<Eigen::VectorXd> correct(const Measurement& measurement, const ErrorState::Correlation& with_r,
                                        const std::vector<Part>& parts, const std::optional<Part>& anchor);
   std::vector<ErrorState::Gain> gains(const ErrorState::Correlation& with_r, const std::vector<Part>& parts,
-                                      const std::optional<Part>& anchor) const;
-  bool isPlace(const Part& part) const;
+                                      const std::optional<Part>& anchor);
+  SE2* placeOf(const Part& part);
 
   StateOptions options_;
   ErrorState errors_;
