@@ -354,12 +354,22 @@ SE2* MultiCloneFilter::placeOf(const Part& part) {
   return nullptr;
 }
 
-/// Those that are best, but for one thing: with systematic errors in the state a displacement corrects where poses are
-/// relative to an anchor, which stays where it is. What tells of the wheels tells of all the way on which they led,
-/// too: corrected as well, it would turn about where the estimate began, odom → base_link would jump by metres, and
-/// pose and reference would come apart where the wheels slip, since corrections of that size do not just add. And a
-/// pose that followed the anchor to where shared ranges say it is would come apart from a newest clone that is not
-/// corrected.
+/// What is learned of the wheels tells where the anchor must have been, too, since they led there: by so much it would
+/// be corrected, size × d.
+MatrixXd MultiCloneFilter::learnedOf(const Part& anchor, const ErrorState::Correlation& with_r) const {
+  MatrixXd learned = MatrixXd::Zero(anchor.size, with_r.innovation.cols());
+  for (const auto& part : {calibration_error_, gyro_bias_error_}) {
+    if (!part) continue;
+    const MatrixXd by_wheels = errors_.covariance(*part).ldlt().solve(errors_.covariance(*part, anchor)).transpose();
+    learned += by_wheels * with_r.gain(*part);
+  }
+  return learned;
+}
+
+/// Those that are best, but for one thing: a displacement tells where poses are relative to each other, and what it
+/// tells of the wheels is for the way to come. They led all the way behind, too. If that were corrected as well, all of
+/// it would turn about where the estimate began, odom → base_link would jump by metres, and pose and reference would
+/// come apart where the wheels slip, since corrections of that size do not just add.
 std::vector<ErrorState::Gain> MultiCloneFilter::gains(const ErrorState::Correlation& with_r,
                                                       const std::vector<Part>& parts,
                                                       const std::optional<Part>& anchor) {
@@ -367,9 +377,9 @@ std::vector<ErrorState::Gain> MultiCloneFilter::gains(const ErrorState::Correlat
   gains.reserve(parts.size());
   for (const Part& part : parts) gains.push_back({part, with_r.gain(part)});
   if (!anchor || !(calibration_error_ || gyro_bias_error_)) return gains;
-  const MatrixXd of_anchor = with_r.gain(*anchor);
+  const MatrixXd learned = learnedOf(*anchor, with_r);
   for (auto& [part, K] : gains) {
-    if (placeOf(part) != nullptr) K -= of_anchor;
+    if (placeOf(part) != nullptr) K -= learned;
   }
   return gains;
 }

@@ -88,11 +88,12 @@ class MultiCloneFilter : public LandmarkStates {
 
   std::vector<Part> statesNotCloned() const;
   std::vector<Part> allStates() const;
-  /// anchor: a pose that stays where it is, see gains(). Returns by what, part for part.
+  /// anchor: a pose that stays where it is, whatever is learned of the wheels. Returns by what, part for part.
   std::vector<Eigen::VectorXd> correct(const Measurement& measurement, const ErrorState::Correlation& with_r,
                                        const std::vector<Part>& parts, const std::optional<Part>& anchor);
   std::vector<ErrorState::Gain> gains(const ErrorState::Correlation& with_r, const std::vector<Part>& parts,
                                       const std::optional<Part>& anchor);
+  Eigen::MatrixXd learnedOf(const Part& anchor, const ErrorState::Correlation& with_r) const;
   SE2* placeOf(const Part& part);
 
   StateOptions options_;
