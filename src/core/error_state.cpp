@@ -66,8 +66,8 @@ void ErrorState::move(Part part, const MatrixXd& B, Part by) {
 
 void ErrorState::disturb(Part part, const MatrixXd& Q) { P_.block(part.row, part.row, part.size, part.size) += Q; }
 
-MatrixXd ErrorState::Correlation::gain(Part part) const {
-  return innovation.llt().solve(state.middleRows(part.row, part.size).transpose()).transpose();
+MatrixXd ErrorState::Correlation::gainOf(const MatrixXd& rows) const {
+  return innovation.llt().solve(rows.transpose()).transpose();
 }
 
 /// C Hᵀ, q × d: what r has of the directions by the state.

@@ -222,9 +222,10 @@ Innovation MultiCloneFilter::innovation(const Displacement& z) const {
   r.H_clone = z.observable * H_k;                                       // (18)
   r.H_pose = z.observable * H_x;
   r.noise = carriedOver(z.J_current, z.variance_current) + z.matching_noise;
-  const ErrorState::Correlation with_r = errors_.correlate(measurement(z, r));
+  ErrorState::Correlation with_r = errors_.correlate(measurement(z, r));
   r.covariance = with_r.innovation;                     // (19)
   r.gain = additive(pose_) * with_r.gain(pose_error_);  // (21)
+  r.with_state = std::move(with_r.state);
   return r;
 }
 
@@ -242,8 +243,7 @@ ErrorState::Measurement MultiCloneFilter::measurement(const Displacement& z, con
 void MultiCloneFilter::update(const Displacement& z, const Innovation& r) {
   if (!present_) present_ = errors_.addRanges(z.variance_current);
   const bool newest = z.clone == 0;
-  const Measurement m = measurement(z, r);
-  correct(m, errors_.correlate(m), newest ? statesNotCloned() : allStates(),
+  correct(measurement(z, r), {r.with_state, r.covariance}, newest ? statesNotCloned() : allStates(),
           newest ? clones_.front().error : clones_.back().error);  // (22)(23)
 }
 
@@ -375,7 +375,8 @@ std::vector<ErrorState::Gain> MultiCloneFilter::gains(const ErrorState::Correlat
                                                       const std::optional<Part>& anchor) {
   std::vector<ErrorState::Gain> gains;
   gains.reserve(parts.size());
-  for (const Part& part : parts) gains.push_back({part, with_r.gain(part)});
+  const MatrixXd best = with_r.gain();
+  for (const Part& part : parts) gains.push_back({part, best.middleRows(part.row, part.size)});
   if (!anchor || !(calibration_error_ || gyro_bias_error_)) return gains;
   const MatrixXd learned = learnedOf(*anchor, with_r);
   for (auto& [part, K] : gains) {

@@ -62,8 +62,12 @@ class ErrorState {
   struct Correlation {
     Eigen::MatrixXd state;       ///< E{x̃ rᵀ}, N × d
     Eigen::MatrixXd innovation;  ///< S = E{r rᵀ}, d × d
-    /// K of a part, size × d.
-    Eigen::MatrixXd gain(Part part) const;
+    /// K of a part, size × d, or of all rows, N × d.
+    Eigen::MatrixXd gain(Part part) const { return gainOf(state.middleRows(part.row, part.size)); }
+    Eigen::MatrixXd gain() const { return gainOf(state); }
+
+   private:
+    Eigen::MatrixXd gainOf(const Eigen::MatrixXd& rows) const;
   };
   Correlation correlate(const Measurement& measurement) const;
 

@@ -19,6 +19,7 @@ struct Innovation {
   MatrixDD noise;                                          ///< covariance of w = J^{k+m} z̃_{k+m} + n, d × d
   MatrixDD covariance;                                     ///< S (19), d × d
   Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3> gain;  ///< K (21) of the evolving state, 3 × d
+  Eigen::MatrixXd with_state;  ///< E{x̃ rᵀ}, N × d, where a method has more states than the pose and its clone
 
   /// Normalised innovation squared rᵀ S⁻¹ r: χ² with d degrees of freedom where the model is right.
   double nis() const;
