@@ -64,7 +64,8 @@ void AlignmentProblem::addSurfacePair(const Pair& pair, const RigidMotion& refer
                                (1.0 / surface.size() + square(along) / surface.spread);
   const double variance = square(current_.range_noise * incidence) + line_variance + square(options.surface_roughness);
   pairs_.push_back(pair);
-  residuals_.push_back({pair.reference, pair.current, surface.normal, surface.centroid, &surface, std::sqrt(variance)});
+  residuals_.push_back(
+      {pair.reference, pair.current, surface.normal, surface.centroid, &surface, 1.0 / std::sqrt(variance)});
 }
 
 void AlignmentProblem::addPointPair(const Pair& pair, const PairOptions& options) {
@@ -77,9 +78,9 @@ void AlignmentProblem::addPointPair(const Pair& pair, const PairOptions& options
   const Eigen::Vector2d& anchor = reference_.points.point[i];
   pairs_.push_back(pair);
   residuals_.push_back({pair.reference, pair.current, quarterTurn(along), anchor, nullptr,
-                        std::sqrt(variance + 0.06 * step.squaredNorm())});
+                        1.0 / std::sqrt(variance + 0.06 * step.squaredNorm())});
   residuals_.push_back(
-      {pair.reference, pair.current, along, anchor, nullptr, std::sqrt(variance + step.squaredNorm())});
+      {pair.reference, pair.current, along, anchor, nullptr, 1.0 / std::sqrt(variance + step.squaredNorm())});
 }
 
 /// What few beams see of a step in a wall is straight within noise, too, and from the next place it is another surface:
@@ -97,7 +98,7 @@ void AlignmentProblem::weighByTurn(const RigidMotion& reference_from_current, co
   std::nth_element(turns.begin(), middle, turns.end());
   const double median = middle->first;
   for (const auto& [turn, residual] : turns)
-    residual->std *= std::sqrt(1.0 + square((turn - median) / options.normal_agreement));
+    residual->precision /= std::sqrt(1.0 + square((turn - median) / options.normal_agreement));
 }
 
 void AlignmentProblem::fitKernel(const RigidMotion& reference_from_current, const PairOptions& options) {
@@ -121,12 +122,16 @@ double AlignmentProblem::overlap() const {
 }
 
 int AlignmentProblem::contradictions() const {
+  if (!contradictions_) contradictions_ = countContradictions();
+  return *contradictions_;
+}
+
+int AlignmentProblem::countContradictions() const {
   const auto countOf = [](const PreparedScan& scan, const std::vector<bool>& paired, const PreparedScan& other,
                           const RigidMotion& other_from_scan) {
     int count = 0;
     for (std::size_t i = 0; i < scan.size(); ++i) {
-      const Eigen::Vector2d p = other_from_scan.C * scan.points.point[i] + other_from_scan.t;
-      if (!paired[i] && other.free_space.contains(p)) ++count;
+      if (!paired[i] && other.free_space.contains(other_from_scan * scan.points.point[i])) ++count;
     }
     return count;
   };
@@ -146,22 +151,24 @@ double AlignmentProblem::agreement() const {
 }
 
 NormalEquations AlignmentProblem::normalEquations(const SE2& reference_from_current) const {
-  NormalEquations equations;
   const RigidMotion motion(reference_from_current);
+  Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();  // of w (A, e) (A, e)ᵀ
+  Eigen::Matrix3d spurious = Eigen::Matrix3d::Zero();
   double lever_square_sum = 0.0;
   for (const Residual& residual : residuals_) {
     const ResidualTerms t = terms(residual, motion);
-    const double w = kernel_.weight(t.e) / (scale_ * scale_);
-    equations.information += w * t.A * t.A.transpose();
-    equations.gradient += w * t.e * t.A;
+    const double w = kernel_.weight(t.e);
+    const Eigen::Vector4d a(t.A.x(), t.A.y(), t.A.z(), t.e);
+    sum += w * a * a.transpose();
     lever_square_sum += t.lever.squaredNorm();
     if (residual.surface == nullptr) continue;
     const Eigen::Vector3d dA = derivativeByNormal(residual, t);
-    const double angle_variance = square(reference_.range_noise) / residual.surface->spread;
-    equations.spurious += w * angle_variance * dA * dA.transpose();
+    spurious += w / residual.surface->spread * dA * dA.transpose();
   }
-  equations.lever = std::sqrt(lever_square_sum / static_cast<double>(residuals_.size()));
-  return equations;
+  const double weight = 1.0 / square(scale_);
+  return {weight * sum.topLeftCorner<3, 3>(), weight * sum.topRightCorner<3, 1>(),
+          weight * square(reference_.range_noise) * spurious,
+          std::sqrt(lever_square_sum / static_cast<double>(residuals_.size()))};
 }
 
 double AlignmentProblem::cost(const SE2& reference_from_current) const {

@@ -20,7 +20,7 @@ using MatrixD3 = Displacement::MatrixD3;
 /// ∂²L/∂x² of one residual.
 Eigen::Matrix3d hessianOf(const RobustKernel& kernel, const Residual& residual, const ResidualTerms& t) {
   Eigen::Matrix3d hessian = kernel.slope(t.e) * t.A * t.A.transpose();
-  hessian(2, 2) -= kernel.influence(t.e) / residual.std * residual.normal.dot(t.lever);
+  hessian(2, 2) -= kernel.influence(t.e) * residual.precision * residual.normal.dot(t.lever);
   return hessian;
 }
 
@@ -32,12 +32,15 @@ struct LossSlope {
 
   LossSlope(const AlignmentProblem& problem, const SE2& x) {
     const RigidMotion motion(x);
+    Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();  // of w (A, e) (A, e)ᵀ
     for (const Residual& residual : problem.residuals()) {
       const ResidualTerms t = problem.terms(residual, motion);
-      gradient += problem.kernel().influence(t.e) * t.A;
-      information += problem.kernel().weight(t.e) * t.A * t.A.transpose();
+      const Eigen::Vector4d a(t.A.x(), t.A.y(), t.A.z(), t.e);
+      sum += problem.kernel().weight(t.e) * a * a.transpose();
       hessian += hessianOf(problem.kernel(), residual, t);
     }
+    information = sum.topLeftCorner<3, 3>();
+    gradient = sum.topRightCorner<3, 1>();
   }
 };
 
@@ -46,7 +49,8 @@ struct LossSlope {
 SE2 minimise(const AlignmentProblem& problem, SE2 x, const ObservableDirections& seen) {
   constexpr int kMaxIterations = 30;
   constexpr double kStep = 1e-9;
-  constexpr double kConvex = 0.3;  // of the curvature with weights fixed
+  constexpr double kNewtonStep = 1e-6;  // after which the error is about its square
+  constexpr double kConvex = 0.3;       // of the curvature with weights fixed
   const auto& B = seen.basis;
   for (int i = 0; i < kMaxIterations; ++i) {
     const LossSlope slope(problem, x);
@@ -55,7 +59,7 @@ SE2 minimise(const AlignmentProblem& problem, SE2 x, const ObservableDirections&
     const bool convex = Eigen::LLT<MatrixDD>(hessian - kConvex * information).info() == Eigen::Success;
     const Eigen::VectorXd step = -(convex ? hessian : information).ldlt().solve(B.transpose() * slope.gradient);
     x = corrected(x, B * step);
-    if (step.norm() < kStep) break;
+    if (step.norm() < (convex ? kNewtonStep : kStep)) break;
   }
   return x;
 }
@@ -90,7 +94,7 @@ double addSurfaceDerivatives(const AlignmentProblem& problem, const Residual& re
   const ScannedPoints& points = problem.reference().points;
   const double along = surface.tangent().dot(t.offset);
   const Eigen::Vector3d by_angle = problem.kernel().influence(t.e) * AlignmentProblem::derivativeByNormal(residual, t);
-  const Eigen::Vector3d by_residual = problem.kernel().slope(t.e) / residual.std * t.A;
+  const Eigen::Vector3d by_residual = problem.kernel().slope(t.e) * residual.precision * t.A;
   const LineByRange by_range(surface, points);
   double together = 0.0;
   for (int j = surface.first; j <= surface.last; ++j) {
@@ -114,8 +118,8 @@ void addDerivatives(const AlignmentProblem& problem, const Residual& residual, c
   const ScannedPoints& current = problem.current().points;
   const auto c = static_cast<std::size_t>(residual.current);
   const Eigen::Vector2d ray = x.C * current.ray[c];
-  Eigen::Vector3d by_range = slope / residual.std * residual.normal.dot(ray) * t.A;
-  by_range.z() += influence / residual.std * residual.normal.dot(quarterTurn(ray));
+  Eigen::Vector3d by_range = slope * residual.precision * residual.normal.dot(ray) * t.A;
+  by_range.z() += influence * residual.precision * residual.normal.dot(quarterTurn(ray));
   out.by_current.col(current.beam[c]) += by_range;
 
   double by_offset = residual.normal.dot(ray);
@@ -125,11 +129,11 @@ void addDerivatives(const AlignmentProblem& problem, const Residual& residual, c
     const ScannedPoints& reference = problem.reference().points;
     const auto r = static_cast<std::size_t>(residual.reference);
     const double shift = -residual.normal.dot(reference.ray[r]);
-    out.by_reference.col(reference.beam[r]) += slope / residual.std * shift * t.A;
+    out.by_reference.col(reference.beam[r]) += slope * residual.precision * shift * t.A;
     by_offset += shift;
   }
   const double w = problem.kernel().weight(t.e);
-  const Eigen::Vector4d a(t.A.x(), t.A.y(), t.A.z(), by_offset / residual.std);
+  const Eigen::Vector4d a(t.A.x(), t.A.y(), t.A.z(), by_offset * residual.precision);
   out.with_offset += w * a * a.transpose();
   out.gradient_with_offset += w * t.e * a;
 }

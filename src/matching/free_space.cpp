@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sckf_odometry/core/se2.h"
+
 namespace sckf {
 
 FreeSpace::FreeSpace(const LaserScan& scan, const Eigen::Isometry3d& base_from_laser, const ScannedPoints& points,
@@ -10,8 +12,9 @@ FreeSpace::FreeSpace(const LaserScan& scan, const Eigen::Isometry3d& base_from_l
     : origin_(base_from_laser.translation().head<2>()), square_reach_(scan.ranges.size(), 0.0) {
   const Eigen::Matrix3d& C = base_from_laser.linear();
   const double sense = C(2, 2) < 0.0 ? -1.0 : 1.0;  // upside down, beams go round the other way
-  first_bearing_ = std::atan2(C(1, 0), C(0, 0)) + sense * scan.angle_min;
+  first_bearing_ = wrapAngle(std::atan2(C(1, 0), C(0, 0)) + sense * scan.angle_min);
   increment_ = sense * scan.angle_increment;
+  beams_in_a_turn_ = 2.0 * M_PI / std::abs(increment_);
   for (std::size_t i = 1; i + 1 < points.size(); ++i) {
     if (points.beam[i + 1] - points.beam[i - 1] != 2) continue;
     const double reach = std::min({points.range[i - 1], points.range[i], points.range[i + 1]}) - margin;
@@ -21,11 +24,10 @@ FreeSpace::FreeSpace(const LaserScan& scan, const Eigen::Isometry3d& base_from_l
 
 bool FreeSpace::contains(const Eigen::Vector2d& point) const {
   const Eigen::Vector2d d = point - origin_;
-  const double turn = std::atan2(d.y(), d.x()) - first_bearing_;
-  const double beams_in_a_turn = 2.0 * M_PI / std::abs(increment_);
-  double beam = std::round(turn / increment_);
-  beam -= beams_in_a_turn * std::floor((beam + 0.5) / beams_in_a_turn);
-  const auto k = static_cast<std::size_t>(std::lround(beam));
+  double beam = (std::atan2(d.y(), d.x()) - first_bearing_) / increment_ + 0.5;  // rounded when it is cut off below
+  if (beam < 0.0) beam += beams_in_a_turn_;
+  if (beam >= beams_in_a_turn_) beam -= beams_in_a_turn_;
+  const auto k = static_cast<std::size_t>(beam);
   return k < square_reach_.size() && d.squaredNorm() < square_reach_[k];
 }
 

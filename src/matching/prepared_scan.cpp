@@ -110,9 +110,10 @@ ScannedPoints readings(const LaserScan& scan, const Eigen::Isometry3d& base_from
   return points;
 }
 
-/// Surfaces and map of the points.
+/// Surfaces, tree and map of the points.
 void describe(PreparedScan& scan, const SurfaceOptions& options) {
   scan.surface = fitSurfaces(scan.points, scan.range_noise, scan.angle_increment, options);
+  scan.tree = PointTree(scan.points.point);
   scan.map.reserve(scan.size());
   for (const Eigen::Vector2d& p : scan.points.point) {
     scan.map.insertPointFast(static_cast<float>(p.x()), static_cast<float>(p.y()), 0.0F);

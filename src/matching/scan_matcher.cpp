@@ -17,8 +17,7 @@ namespace {
 /// Where the search for the displacement has come to.
 struct Alignment {
   SE2 reference_from_current;
-  double surprise = 0.0;   // squared Mahalanobis distance from the prior
-  double agreement = 0.0;  // of the problem
+  double surprise = 0.0;  // squared Mahalanobis distance from the prior
   AlignmentProblem problem;
 
   /// Of the points: smaller is better.
@@ -123,8 +122,7 @@ class Search {
       x = corrected(x, step);
       const bool settled = step.cwiseAbs().maxCoeff() < kSettled || i >= options_.max_iterations;
       if (settled && distance <= options_.pairs.max_distance) {
-        const double agreement = problem.agreement();
-        return Alignment{x, surprise(x), agreement, std::move(problem)};
+        return Alignment{x, surprise(x), std::move(problem)};
       }
       distance = std::max(options_.pairs.max_distance, 0.6 * distance);
     }
@@ -163,15 +161,15 @@ class Search {
   bool better(const Alignment& far, const Alignment& best) const {
     const bool near = best.surprise <= kSurprise;
     if (near) return far.cost() + kGain * static_cast<double>(current_.size()) < best.cost();
-    return far.cost() < best.cost() && far.agreement > best.agreement + kAgreesBetter;
+    return far.cost() < best.cost() && far.problem.agreement() > best.problem.agreement() + kAgreesBetter;
   }
 
   bool fits(const Alignment& alignment) const {
-    return alignment.agreement >= options_.wide_search_below_agreement && alignment.surprise <= kSurprise;
+    return alignment.problem.agreement() >= options_.wide_search_below_agreement && alignment.surprise <= kSurprise;
   }
 
   bool suspicious(const Alignment& alignment) const {
-    return alignment.agreement < options_.search_below_agreement || alignment.problem.scale() > kRough ||
+    return alignment.problem.agreement() < options_.search_below_agreement || alignment.problem.scale() > kRough ||
            alignment.surprise > kSurprise;
   }
 
@@ -198,7 +196,7 @@ Match concluded(const std::optional<Alignment>& aligned, const MatcherOptions& o
   std::optional<DisplacementEstimate> estimate = estimateDisplacement(aligned->problem, start, options.estimation);
   match.pairs = aligned->problem.pairs();
   match.overlap = aligned->problem.overlap();
-  match.agreement = aligned->agreement;
+  match.agreement = aligned->problem.agreement();
   match.residual_rms = estimate ? estimate->residual_rms : 0.0;
   if (estimate) match.range_offset = estimate->range_offset;
   if (match.overlap < options.min_overlap) {
@@ -215,18 +213,23 @@ Match concluded(const std::optional<Alignment>& aligned, const MatcherOptions& o
   return match;
 }
 
-/// The match refined by one of the scans with their roles exchanged, if there is one close to it.
+/// The match refined by one of the scans with their roles exchanged, paired where they lie by now, if there is one
+/// close to it.
 Match refinedByReturn(Match match, const PreparedScan& reference, const PreparedScan& current,
                       const MatcherOptions& options) {
   constexpr double kFarthest = 0.1;  // [m]
   constexpr double kTurned = 0.05;   // [rad]
   if (!options.both_ways || !match.displacement || match.displacement->dimension() != 3) return match;
   const SE2& there = match.displacement->reference_from_current;
-  const Match back = concluded(Search(current, reference, {inverse(there)}, options).runNear(), options);
-  if (!back.displacement || back.displacement->dimension() != 3) return match;
-  const Eigen::Vector3d e = error(inverse(back.displacement->reference_from_current), there);
+  const SE2 start = inverse(there);
+  const AlignmentProblem problem(current, reference, start, options.pairs.max_distance, options.pairs);
+  if (problem.pairs().size() < static_cast<std::size_t>(options.min_pairs)) return match;
+  if (problem.agreement() < options.min_agreement) return match;
+  const auto back = estimateDisplacement(problem, start, options.estimation);
+  if (!back || back->displacement.dimension() != 3) return match;
+  const Eigen::Vector3d e = error(inverse(back->displacement.reference_from_current), there);
   if (e.head<2>().norm() > kFarthest || std::abs(e.z()) > kTurned) return match;
-  match.displacement = meanOfBothWays(*match.displacement, *back.displacement);
+  match.displacement = meanOfBothWays(*match.displacement, back->displacement);
   return match;
 }
 

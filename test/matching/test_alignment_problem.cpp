@@ -37,7 +37,7 @@ TEST(AlignmentProblem, SurfacesThatAreTurnedAgainstEachOtherByMoreThanMostWeighL
     int others = 0;
     for (std::size_t i = 0; i < problem.residuals().size(); ++i) {
       const Residual& residual = problem.residuals()[i];
-      const double ratio = residual.std / plain.residuals()[i].std;
+      const double ratio = plain.residuals()[i].precision / residual.precision;
       if (residual.surface == nullptr || residual.surface->centroid.cwiseAbs().minCoeff() > 1.5) continue;
       const bool ahead = residual.surface->centroid.x() > 2.5;
       EXPECT_NEAR(ratio, ahead ? std::hypot(1.0, 0.05 / 0.1) : 1.0, 0.01) << residual.surface->centroid.transpose();

@@ -79,6 +79,26 @@ TEST(NearestNeighbours, AreNotAskedForAgainWhileTheyStayTheSame) {
   EXPECT_LT(neighbours.queries(), 1.5 * current->size());
 }
 
+TEST(PointTree, TellsTheNearestAndHowFarAllOthersAre) {
+  const PointTree tree({{0.0, 0.0}, {0.3, 0.0}, {0.0, 0.4}, {2.0, 0.0}});
+  const PointTree::Answer both = tree.nearest({0.0, 0.3}, 0.5);
+  EXPECT_TRUE(both.found);
+  EXPECT_EQ(both.nearest, 2U);
+  EXPECT_NEAR(both.distance, 0.1, 1e-12);
+  EXPECT_NEAR(both.next, 0.3, 1e-12);
+  const PointTree::Answer one = tree.nearest({1.9, 0.0}, 0.5);  // the others are farther than is asked for
+  EXPECT_TRUE(one.found);
+  EXPECT_EQ(one.nearest, 3U);
+  EXPECT_NEAR(one.distance, 0.1, 1e-12);
+  EXPECT_NEAR(one.next, 0.5, 1e-12);
+  const PointTree::Answer none = tree.nearest({5.0, 5.0}, 0.5);
+  EXPECT_FALSE(none.found);
+  EXPECT_NEAR(none.distance, 0.5, 1e-12);
+  EXPECT_NEAR(none.next, 0.5, 1e-12);
+  EXPECT_FALSE(PointTree().nearest({0.0, 0.0}, 1e9).found);
+  EXPECT_FALSE(PointTree(std::vector<Eigen::Vector2d>()).nearest({0.0, 0.0}, 1e9).found);
+}
+
 TEST(NearestNeighbours, OfAReferenceWithoutPointsAreNone) {
   std::mt19937_64 random(43);
   const auto current = scanFrom({0.3, 0.1, 0.2}, random);

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "sckf_odometry/core/se2.h"
@@ -26,11 +27,11 @@ struct RobustKernel {
   double c = 3.0;
 
   double loss(double e) const { return 0.5 * c * c * std::log1p(e * e / (c * c)); }
-  double weight(double e) const { return 1.0 / (1.0 + e * e / (c * c)); }  ///< ρ′(e) / e
-  double influence(double e) const { return e * weight(e); }               ///< ρ′(e)
-  double slope(double e) const {                                           ///< ρ″(e)
+  double weight(double e) const { return c * c / (c * c + e * e); }  ///< w = ρ′(e) / e
+  double influence(double e) const { return e * weight(e); }         ///< ρ′(e)
+  double slope(double e) const {                                     ///< ρ″(e) = w (2 w − 1)
     const double w = weight(e);
-    return (1.0 - e * e / (c * c)) * w * w;
+    return w * (2.0 * w - 1.0);
   }
 };
 
@@ -42,7 +43,7 @@ struct Residual {
   Eigen::Vector2d normal;            ///< n
   Eigen::Vector2d anchor;            ///< a: centroid of the surface, or the point itself
   const Surface* surface = nullptr;  ///< null for single points
-  double std = 1.0;                  ///< σ [m]
+  double precision = 1.0;            ///< 1 / σ [1/m], since divisions take long
 };
 
 /// Everything that one residual has to tell at a displacement.
@@ -106,6 +107,7 @@ class AlignmentProblem {
   void addPointPair(const Pair& pair, const PairOptions& options);
   void weighByTurn(const RigidMotion& reference_from_current, const PairOptions& options);
   void fitKernel(const RigidMotion& reference_from_current, const PairOptions& options);
+  int countContradictions() const;
 
   const PreparedScan& reference_;
   const PreparedScan& current_;
@@ -114,6 +116,7 @@ class AlignmentProblem {
   std::vector<Residual> residuals_;
   RobustKernel kernel_;
   double scale_ = 1.0;
+  mutable std::optional<int> contradictions_;  // counted when they are first asked for
 };
 
 // These are inline because most of the time of a match is spent in them.
@@ -123,9 +126,9 @@ inline ResidualTerms AlignmentProblem::terms(const Residual& residual,
   ResidualTerms terms;
   terms.lever = reference_from_current.C * current_.points.point[static_cast<std::size_t>(residual.current)];
   terms.offset = terms.lever + reference_from_current.t - residual.anchor;
-  terms.e = residual.normal.dot(terms.offset) / residual.std;
+  terms.e = residual.precision * residual.normal.dot(terms.offset);
   terms.A << residual.normal, residual.normal.dot(quarterTurn(terms.lever));
-  terms.A /= residual.std;
+  terms.A *= residual.precision;
   return terms;
 }
 
@@ -133,7 +136,7 @@ inline Eigen::Vector3d AlignmentProblem::derivativeByNormal(const Residual& resi
   const Eigen::Vector2d tangent = quarterTurn(residual.normal);
   Eigen::Vector3d dA;
   dA << tangent, tangent.dot(quarterTurn(terms.lever));
-  return dA / residual.std;
+  return residual.precision * dA;
 }
 
 }  // namespace sckf

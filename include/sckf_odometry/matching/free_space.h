@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <vector>
 
 #include "sckf_odometry/matching/laser_scan.h"
@@ -27,9 +28,10 @@ class FreeSpace {
 
  private:
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();  // of the laser, in base_link [m]
-  double first_bearing_ = 0.0;                        // of beam 0, in base_link [rad]
+  double first_bearing_ = 0.0;                        // of beam 0, in base_link, in [−π, π] [rad]
   double increment_ = 1.0;                            // [rad], counter-clockwise in base_link
-  std::vector<double> square_reach_;                  // of the free space along each beam [m²]
+  double beams_in_a_turn_ = 2.0 * M_PI;
+  std::vector<double> square_reach_;  // of the free space along each beam [m²]
 };
 
 }  // namespace sckf

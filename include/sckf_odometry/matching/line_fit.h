@@ -30,29 +30,25 @@ class LineFits {
 class LineByRange {
  public:
   LineByRange(const Surface& line, const ScannedPoints& points)
-      : points_(points),
-        centroid_(line.centroid),
-        normal_(line.normal),
-        by_spread_(1.0 / line.spread),
-        by_size_(1.0 / line.size()) {}
+      : points_(points), centroid_(line.centroid), shift_by_ray_(line.normal / line.size()) {
+    const Eigen::Matrix2d across_along = line.normal * line.tangent().transpose();
+    turn_by_ray_ = -(across_along + across_along.transpose()) / line.spread;
+  }
 
   /// The angle of its normal [rad/m] …
   double turn(int point) const {
     const auto k = static_cast<std::size_t>(point);
-    const Eigen::Vector2d d = points_.point[k] - centroid_;
-    const Eigen::Vector2d tangent = quarterTurn(normal_);
-    return -by_spread_ * (tangent.dot(points_.ray[k]) * normal_.dot(d) + tangent.dot(d) * normal_.dot(points_.ray[k]));
+    return points_.ray[k].dot(turn_by_ray_ * (points_.point[k] - centroid_));
   }
 
   /// … and its centroid, across it.
-  double shift(int point) const { return by_size_ * normal_.dot(points_.ray[static_cast<std::size_t>(point)]); }
+  double shift(int point) const { return shift_by_ray_.dot(points_.ray[static_cast<std::size_t>(point)]); }
 
  private:
   const ScannedPoints& points_;
   Eigen::Vector2d centroid_;
-  Eigen::Vector2d normal_;
-  double by_spread_;
-  double by_size_;
+  Eigen::Vector2d shift_by_ray_;
+  Eigen::Matrix2d turn_by_ray_;
 };
 
 /// Whether the points i and i + 1 can lie on one surface: no farther apart than on a surface seen at a grazing angle

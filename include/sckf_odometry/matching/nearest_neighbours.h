@@ -16,9 +16,9 @@ struct Pair {
   int current = 0;
 };
 
-/// The nearest points by MRPT's k-d tree. It is asked for the two nearest of a point, and not again until that point
-/// has moved by half of what one is nearer than the other, or has come near enough to any: until then it would tell the
-/// same, and most steps of an alignment are smaller. Both scans must outlive this.
+/// The nearest points by the tree of the reference. It is asked about a point, and not again until that has moved by
+/// half of what one is nearer than all others, or may have come near enough to any: until then it would tell the same,
+/// and most steps of an alignment are smaller. Both scans must outlive this.
 class NearestNeighbours {
  public:
   NearestNeighbours(const PreparedScan& reference, const PreparedScan& current);
@@ -38,13 +38,11 @@ class NearestNeighbours {
     double valid_within = -1.0;  // [m] of where it was asked; negative: nothing is known
   };
 
-  void ask(const Eigen::Vector2d& point, Nearest& nearest);
+  void ask(const Eigen::Vector2d& point, double within, Nearest& nearest);
 
   const PreparedScan& reference_;
   const PreparedScan& current_;
-  std::vector<Nearest> nearest_;      // of each current point
-  std::vector<std::size_t> indices_;  // what the tree answers
-  std::vector<float> squares_;
+  std::vector<Nearest> nearest_;  // of each current point
   std::size_t queries_ = 0;
 };
 

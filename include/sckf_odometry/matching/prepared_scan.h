@@ -11,6 +11,7 @@
 
 #include "sckf_odometry/matching/free_space.h"
 #include "sckf_odometry/matching/laser_scan.h"
+#include "sckf_odometry/matching/point_tree.h"
 #include "sckf_odometry/matching/scan_motion.h"
 #include "sckf_odometry/matching/surface.h"
 
@@ -36,7 +37,8 @@ struct PreparedScan {
   double range_offset = 0.0;               ///< that has been added to each range [m]
   ScannedPoints points;                    ///< the readings
   std::vector<Surface> surface;            ///< the surface around each point
-  mrpt::maps::CSimplePointsMap map;        ///< the same points, for CICP and for nearest neighbours
+  PointTree tree;                          ///< the same points, for nearest neighbours
+  mrpt::maps::CSimplePointsMap map;        ///< and for CICP
   FreeSpace free_space;                    ///< what the laser looked through
   std::vector<Eigen::Vector2d> set_aside;  ///< what else the laser has seen: points that are not to be matched
 
