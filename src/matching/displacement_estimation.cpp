@@ -241,14 +241,14 @@ Displacement meanOfBothWays(const Displacement& there, const Displacement& back)
   const SE2 inverted = inverse(back.reference_from_current, &by_back);
   const Eigen::Matrix3d to_coordinates = there.observable;
   const Eigen::Matrix3d A = to_coordinates * by_back * Eigen::Matrix3d(back.observable).inverse();
-  const Eigen::Vector3d half_difference = 0.5 * error(inverted, there.reference_from_current);
-  const Eigen::Vector3d d = to_coordinates * half_difference;
+  const Eigen::Vector3d difference = error(inverted, there.reference_from_current);
+  const Eigen::Vector3d d = to_coordinates * difference;
   Displacement mean = there;
-  mean.reference_from_current = corrected(there.reference_from_current, half_difference);
+  mean.reference_from_current = corrected(there.reference_from_current, 0.5 * difference);
   mean.J_reference = 0.5 * (there.J_reference + A * back.J_current);
   mean.J_current = 0.5 * (there.J_current + A * back.J_reference);
   mean.matching_noise =
-      symmetric(0.5 * (there.matching_noise + A * back.matching_noise * A.transpose()) + d * d.transpose());
+      symmetric(0.5 * (there.matching_noise + A * back.matching_noise * A.transpose()) + 0.5 * d * d.transpose());
   return mean;
 }
 

@@ -92,6 +92,7 @@ class FusionMethod {
   /// Residual, its covariance and the gain that update() would use: for gating. The displacement must see at least
   /// one direction (d ≥ 1), and have J_reference with as many columns as the last clone() had ranges.
   virtual Innovation innovation(const Displacement& displacement) const = 0;
+  /// innovation: that of the displacement, by the state as it is now.
   virtual void update(const Displacement& displacement, const Innovation& innovation) = 0;
 
   /// What the increment is with all that is known of the wheels and all that is measured of the motion.

@@ -41,8 +41,8 @@ std::optional<DisplacementEstimate> estimateDisplacement(const AlignmentProblem&
 
 /// The mean of a displacement and of that of the same scans with their roles exchanged, both of dimension 3. The same
 /// ranges are in both, by Jacobians that add; which points and surfaces are taken together is not the same, and errs
-/// less in the mean. What residuals scatter in each is taken for common to both, and half their difference for a sample
-/// of what is left.
+/// less in the mean. What residuals scatter in each is taken for common to both. Their difference d tells of what is
+/// left, as a sample of two, d dᵀ / 2: that of either and of the mean, since both begin at the same place.
 Displacement meanOfBothWays(const Displacement& reference_from_current, const Displacement& current_from_reference);
 
 }  // namespace sckf
