@@ -53,6 +53,13 @@ class Search {
   /// From the predicted displacement and nowhere else.
   std::optional<Alignment> runNear() const { return align(mean_, options_.pairs.max_distance); }
 
+  /// At the predicted displacement, as it is: points are paired once. Empty with too few pairs.
+  std::optional<Alignment> there() const {
+    AlignmentProblem problem(reference_, current_, mean_, options_.pairs.max_distance, options_.pairs);
+    if (!hasEnoughPairs(problem)) return std::nullopt;
+    return Alignment{mean_, 0.0, std::move(problem)};
+  }
+
  private:
   static constexpr double kRough = 2.0;          // residuals of twice what noise explains
   static constexpr double kSurprise = 16.0;      // four sigma from the prior
@@ -117,7 +124,7 @@ class Search {
     NearestNeighbours neighbours(reference_, current_);
     for (int i = 1;; ++i) {
       AlignmentProblem problem(reference_, current_, x, neighbours.pairs(RigidMotion(x), distance), options_.pairs);
-      if (problem.pairs().size() < static_cast<std::size_t>(options_.min_pairs)) return std::nullopt;
+      if (!hasEnoughPairs(problem)) return std::nullopt;
       const Eigen::Vector3d step = mapStep(problem.normalEquations(x), x);
       x = corrected(x, step);
       const bool settled = step.cwiseAbs().maxCoeff() < kSettled || i >= options_.max_iterations;
@@ -126,6 +133,10 @@ class Search {
       }
       distance = std::max(options_.pairs.max_distance, 0.6 * distance);
     }
+  }
+
+  bool hasEnoughPairs(const AlignmentProblem& problem) const {
+    return problem.pairs().size() >= static_cast<std::size_t>(options_.min_pairs);
   }
 
   double surprise(const SE2& x) const {
@@ -221,15 +232,11 @@ Match refinedByReturn(Match match, const PreparedScan& reference, const Prepared
   constexpr double kTurned = 0.05;   // [rad]
   if (!options.both_ways || !match.displacement || match.displacement->dimension() != 3) return match;
   const SE2& there = match.displacement->reference_from_current;
-  const SE2 start = inverse(there);
-  const AlignmentProblem problem(current, reference, start, options.pairs.max_distance, options.pairs);
-  if (problem.pairs().size() < static_cast<std::size_t>(options.min_pairs)) return match;
-  if (problem.agreement() < options.min_agreement) return match;
-  const auto back = estimateDisplacement(problem, start, options.estimation);
-  if (!back || back->displacement.dimension() != 3) return match;
-  const Eigen::Vector3d e = error(inverse(back->displacement.reference_from_current), there);
+  const Match back = concluded(Search(current, reference, {inverse(there)}, options).there(), options);
+  if (!back.displacement || back.displacement->dimension() != 3) return match;
+  const Eigen::Vector3d e = error(inverse(back.displacement->reference_from_current), there);
   if (e.head<2>().norm() > kFarthest || std::abs(e.z()) > kTurned) return match;
-  match.displacement = meanOfBothWays(*match.displacement, back->displacement);
+  match.displacement = meanOfBothWays(*match.displacement, *back.displacement);
   return match;
 }
 
