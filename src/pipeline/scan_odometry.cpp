@@ -164,6 +164,7 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   if (at_before) followScans(before, *at_before, report);
   if (report.new_reference) {
     compareWithOlderReferences(report);
+    if (laser.failures > 0) admitFailure(laser.failures, report.laser);
     allowForCommonErrors(report);
     filter_->clone(report.scan->rangeVariances());  // (24)-(27)
     references_.add(report.scan, report.laser, options_.reference.kept, *filter_);
@@ -249,6 +250,7 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
     laser.policy = ReferencePolicy(options_.reference);
     laser.range_offset = RangeOffset(options_.range_offset_std);
     laser.taken.reset();
+    laser.failures = 0;
   }
   landmarks_ = Landmarks(options_.landmarks);
   carried_on_.reset();

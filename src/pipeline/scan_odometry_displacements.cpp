@@ -1,5 +1,4 @@
 // How a scan corrects the estimate: by displacements from references, by landmarks, by a heading.
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <sstream>
 
@@ -19,6 +18,13 @@ std::string describe(const Innovation& innovation, double bound) {
   return text.str();
 }
 
+std::string describeDoubt(double agreement, double expected) {
+  std::ostringstream text;
+  text << "the scans agree by " << agreement << " with a reference that could not be placed itself: expected "
+       << expected;
+  return text.str();
+}
+
 }  // namespace
 
 void ScanOdometry::compareWithReference(std::size_t clone, ScanReport& report) {
@@ -28,17 +34,19 @@ void ScanOdometry::compareWithReference(std::size_t clone, ScanReport& report) {
   const Stopwatch stopwatch;
   report.match = matcher_.match(reference, *report.scan, report.prediction);  // (1)
   report.match_time = stopwatch.seconds();
+  bool used = false;
   if (report.match.displacement) {
     report.match.displacement->clone = clone;
-    lasers_[report.laser].range_offset.add(report.match.range_offset, report.scan->range_offset);
-  }
-  const bool used = report.match.displacement ? fuse(report) : false;  // (17)-(23)
-  if (!report.match.displacement) {
+    used = fuse(report);  // (17)-(23)
+  } else {
     report.outcome = ScanOutcome::kNoMatch;
     report.reason = toString(report.match.failure);
   }
+  Laser& laser = lasers_[report.laser];
+  laser.failures = used ? 0 : laser.failures + 1;
+  if (used) laser.range_offset.add(report.match.range_offset, report.scan->range_offset);
   const SE2 reference_from_scan = filter_->predictedDisplacementFrom(clone).reference_from_current;
-  report.new_reference = lasers_[report.laser].policy.replaces(reference_from_scan, report.match.overlap, used);
+  report.new_reference = laser.policy.replaces(reference_from_scan, report.match.overlap, used);
 }
 
 bool ScanOdometry::fuse(ScanReport& report) {
@@ -46,14 +54,17 @@ bool ScanOdometry::fuse(ScanReport& report) {
   const double bound = gate(displacement);
   report.innovation = filter_->innovation(displacement);
   report.nis_bound = bound;
+  if (lasers_[report.laser].failures > 0 && report.match.agreement < options_.gate.doubtful_min_agreement) {
+    report.outcome = ScanOutcome::kGated;
+    report.reason = describeDoubt(report.match.agreement, options_.gate.doubtful_min_agreement);
+    return false;
+  }
   report.outcome = ScanOutcome::kUpdated;
   const Displacement::MatrixDD slack = slackAmongLasers(displacement);
   const auto contradicts = [&] { return report.innovation->nis(slack) > bound; };
   const bool slipped = contradicts() && looksLikeSlip(report.match);
   if (slipped) {
-    const Eigen::Vector3d std(options_.gate.slip_std_translation, options_.gate.slip_std_translation,
-                              options_.gate.slip_std_yaw);
-    filter_->distrustWheels(std.cwiseAbs2().asDiagonal());
+    distrustWheels();
     report.innovation = filter_->innovation(displacement);
     if (report.wheels_known) report.outcome = ScanOutcome::kSlip;
   }
@@ -62,34 +73,38 @@ bool ScanOdometry::fuse(ScanReport& report) {
     report.reason = describe(*report.innovation, bound);
     return false;
   }
-  if (slipped) followSlip(displacement);
-  filter_->update(displacement, slipped ? filter_->innovation(displacement) : *report.innovation);
+  filter_->update(displacement, *report.innovation);
   return true;
 }
 
-/// Linearised about wheels that were wrong by a radian the update would miss the place. They are so uncertain now that
-/// nothing is lost by linearising it where the displacement says that the robot is, as far as that sees.
-void ScanOdometry::followSlip(const Displacement& displacement) {
-  const DisplacementPrediction prediction = filter_->predictedDisplacementFrom(displacement.clone);
-  const SE2& predicted = prediction.reference_from_current;
-  const auto& V = displacement.observable;
-  const Displacement::MatrixD3 V_P = V * prediction.covariance;
-  const Displacement::MatrixDD S = V_P * V.transpose() + displacement.covariance();
-  const Eigen::Vector3d off =
-      V_P.transpose() * S.llt().solve(V * error(displacement.reference_from_current, predicted));
-  OdometryIncrement slipped{between(predicted, corrected(predicted, off)), Eigen::Matrix3d::Zero()};
-  slipped.by_wheels = false;
-  filter_->propagate(slipped);
+/// Scan or wheels are wrong, and nobody knows which: the estimate may be off by a slip. So it is at the scans after it
+/// until one is placed again, and a reference that could not be placed, nor any scan from it, is of no use.
+void ScanOdometry::admitFailure(int failures, std::size_t laser) {
+  if (failures > 1) {
+    references_.forgetNewestOf(laser, *filter_);
+  } else if (options_.gate.trust_scans_on_slip) {
+    distrustWheels();
+  }
+}
+
+void ScanOdometry::distrustWheels() {
+  const Eigen::Vector3d std(options_.gate.slip_std_translation, options_.gate.slip_std_translation,
+                            options_.gate.slip_std_yaw);
+  filter_->distrustWheels(std.cwiseAbs2().asDiagonal());
 }
 
 void ScanOdometry::compareWithOlderReferences(ScanReport& report) {
+  if (report.outcome == ScanOutcome::kGated) return;  // what it says is not believed
   const ReferenceOptions& options = options_.reference;
+  Laser& laser = lasers_[report.laser];
   for (const std::size_t clone : references_.worthComparing(report.laser, *filter_, options)) {
     DisplacementPrediction prediction = filter_->predictedDisplacementFrom(clone);
     const Eigen::Matrix3d slack = references_.slack(clone, options);
     prediction.covariance += slack;
-    Match match = matcher_.matchNear(references_[clone], *report.scan, prediction);
+    const bool placed = laser.failures == 0;
+    Match match = matchWithOlder(references_[clone], *report.scan, prediction, placed);
     if (!match.displacement || match.overlap < options.older_min_overlap) continue;
+    if (!placed && !looksLikeSlip(match)) continue;
     Displacement& displacement = *match.displacement;
     displacement.clone = clone;
     displacement.matching_noise += (options.older_inflation - 1.0) * displacement.covariance();
@@ -98,7 +113,23 @@ void ScanOdometry::compareWithOlderReferences(ScanReport& report) {
       continue;
     filter_->update(displacement, innovation);
     ++report.older_references;
+    laser.failures = 0;
   }
+}
+
+/// Near the prediction; or, where that may be far off and the scan is none that fits nowhere, wherever the scans fall
+/// together without doubt.
+Match ScanOdometry::matchWithOlder(const PreparedScan& reference, const PreparedScan& scan,
+                                   const DisplacementPrediction& prediction, bool placed) const {
+  if (placed && isVague(prediction)) {
+    Match match = matcher_.match(reference, scan, prediction);
+    if (match.displacement && match.displacement->dimension() == 3 &&
+        match.agreement >= options_.gate.doubtful_min_agreement &&
+        match.residual_rms <= options_.gate.slip_max_residual) {
+      return match;
+    }
+  }
+  return matcher_.matchNear(reference, scan, prediction);
 }
 
 /// What matches err by beyond range noise is partly the same from reference to reference, as the same surfaces are

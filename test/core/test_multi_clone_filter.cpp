@@ -38,6 +38,17 @@ SE2 exponential(const Eigen::Vector3d& xi) {
   return {sum(0, 2), sum(1, 2), std::atan2(sum(1, 0), sum(0, 0))};
 }
 
+/// ξ of a displacement: exp(ξ) has the translation V(θ) ρ.
+Eigen::Vector3d logarithm(const SE2& d) {
+  const double yaw = d.yaw;
+  Eigen::Matrix2d V = Eigen::Matrix2d::Identity();
+  if (std::abs(yaw) > 1e-9) V << std::sin(yaw), std::cos(yaw) - 1.0, 1.0 - std::cos(yaw), std::sin(yaw);
+  if (std::abs(yaw) > 1e-9) V /= yaw;
+  Eigen::Vector3d xi;
+  xi << V.inverse() * d.translation(), yaw;
+  return xi;
+}
+
 /// One covariance matrix of all ξ and of all range noise, and nothing folded, skipped or shared:
 ///   [ ξ (pose);  ξ of each clone, the newest first;  z̃ of each clone;  z̃ of the present scan ]
 class DenseMultiCloneFilter {
@@ -77,7 +88,11 @@ class DenseMultiCloneFilter {
     H.middleCols(3 * static_cast<Index>(z.clone + 1), 3) = z.observable * J_k * additive(poses_[z.clone + 1]);
     H.middleCols(firstRange(z.clone), sizes_[z.clone]) = z.J_reference;
     H.rightCols(sizes_.back()) = z.J_current;
-    const Eigen::VectorXd r = z.observable * error(z.reference_from_current, predicted);
+    const MatrixXd V = z.observable;
+    const Eigen::Vector3d seen =
+        V.transpose() * (V * V.transpose()).inverse() * V * error(z.reference_from_current, predicted);
+    const SE2 measured = compose(poses_[z.clone + 1], corrected(predicted, seen));
+    const Eigen::VectorXd r = z.observable * J * additive(poses_[0]) * logarithm(compose(measured, inverse(poses_[0])));
     const MatrixXd S = H * P_ * H.transpose() + z.matching_noise;
     MatrixXd K = P_ * H.transpose() * S.inverse();
     const Index corrected = z.clone == 0 ? 3 : 3 * static_cast<Index>(poses_.size());
@@ -267,6 +282,31 @@ TEST(MultiCloneFilter, AScanThatWasNotUsedIsIndependent) {
   const Matrix3d without_ranges = filter.predictedDisplacement().covariance;
   const MatrixXd expected = z.observable * without_ranges * z.observable.transpose() + z.covariance();
   EXPECT_TRUE(matricesClose(filter.innovation(z).covariance, expected, 1e-9));
+}
+
+/// The wheels are wrong by a radian between two references. A displacement from the first, at a scan after the second,
+/// tells: pose and second reference come to where they must have been, though the correction is not small.
+TEST(MultiCloneFilter, ACorrectionOfARadianEndsWhereTheDisplacementSays) {
+  const Eigen::VectorXd one_range = Eigen::VectorXd::Constant(1, 1e-8);
+  MultiCloneFilter filter(SE2(2.0, -1.0, 0.4), 1e-6 * Matrix3d::Identity());
+  filter.clone(one_range);
+  const SE2 start = filter.pose();
+  filter.propagate({SE2(0.5, 0.0, 0.0), 1e-8 * Matrix3d::Identity()});
+  filter.distrustWheels(Matrix3d::Identity());
+  filter.clone(one_range);
+  filter.propagate({SE2(1.0, 0.2, 0.0), 1e-8 * Matrix3d::Identity()});
+  const SE2 second = compose(start, SE2(0.4, -0.3, 1.1));
+  const SE2 last = compose(second, SE2(1.0, 0.2, 0.0));
+  Displacement z;
+  z.clone = 1;
+  z.reference_from_current = between(start, last);
+  z.J_reference = z.J_current = MatrixXd::Zero(3, 1);
+  z.variance_reference = z.variance_current = one_range;
+  z.matching_noise = 1e-8 * Matrix3d::Identity();
+  filter.update(z, filter.innovation(z));
+  EXPECT_TRUE(matricesNear(filter.pose().vector(), last.vector(), 1e-3));
+  EXPECT_TRUE(matricesNear(filter.clonedPose(0).vector(), second.vector(), 1e-3));
+  EXPECT_TRUE(matricesNear(filter.clonedPose(1).vector(), start.vector(), 1e-3));
 }
 
 }  // namespace

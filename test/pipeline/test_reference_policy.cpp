@@ -13,7 +13,6 @@ ReferenceOptions limits() {
   options.kf_dist_linear = 1.0;
   options.kf_dist_angular = 0.5;
   options.kf_min_overlap = 0.6;
-  options.kf_max_failures = 3;
   return options;
 }
 
@@ -66,38 +65,13 @@ TEST(ReferencePolicy, ReplacesWhereScansHardlyOverlap) {
   EXPECT_FALSE(ReferencePolicy(limits()).replaces(SE2(), 0.61, true));
 }
 
-/// A scan that could not be used, as of a person before the laser, says nothing about the reference by itself …
-TEST(ReferencePolicy, TheOverlapOfAScanThatWasNotUsedDoesNotCount) {
-  EXPECT_FALSE(ReferencePolicy(limits()).replaces(SE2(), 0.0, false));
-}
-
-/// … but a number of them in a row does.
-TEST(ReferencePolicy, ReplacesAfterFailuresInARow) {
+/// If the robot is not where the wheels say, the next scan is nearer to this one.
+TEST(ReferencePolicy, AScanThatWasNotUsedReplacesAtOnce) {
   ReferencePolicy policy(limits());
-  for (int round = 0; round < 2; ++round) {
-    EXPECT_FALSE(policy.replaces(SE2(), 0.0, false)) << round;
-    EXPECT_FALSE(policy.replaces(SE2(), 0.0, false)) << round;
-    EXPECT_TRUE(policy.replaces(SE2(), 0.0, false)) << round;
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_TRUE(policy.replaces(SE2(), kGoodOverlap, false)) << i;
+    EXPECT_FALSE(policy.replaces(SE2(0.4, 0, 0), kGoodOverlap, true)) << i << ": the step begins anew there";
   }
-}
-
-TEST(ReferencePolicy, ASuccessEndsTheRowOfFailures) {
-  ReferencePolicy policy(limits());
-  for (int i = 0; i < 5; ++i) {
-    EXPECT_FALSE(policy.replaces(SE2(), 0.0, false)) << i;
-    EXPECT_FALSE(policy.replaces(SE2(), 0.0, false)) << i;
-    EXPECT_FALSE(policy.replaces(SE2(), kGoodOverlap, true)) << i;
-  }
-}
-
-TEST(ReferencePolicy, OneFailureIsEnoughIfSoChosen) {
-  ReferenceOptions options = limits();
-  options.kf_max_failures = 1;
-  EXPECT_TRUE(ReferencePolicy(options).replaces(SE2(), 0.0, false));
-}
-
-TEST(ReferencePolicy, AFarScanReplacesEvenIfItFailed) {
-  EXPECT_TRUE(ReferencePolicy(limits()).replaces(SE2(2.0, 0, 0), 0.0, false));
 }
 
 /// The algorithm of the paper: every scan is the next one's reference, as long as the robot moves at all.

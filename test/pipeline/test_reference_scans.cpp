@@ -57,6 +57,30 @@ TEST(ReferenceScans, WhatIsFarOrTurnedIsNotCompared) {
   EXPECT_THAT(way.scans.worthComparing(0, filter, limits(9)), IsEmpty()) << "turned by more than 1.5 rad";
 }
 
+TEST(ReferenceScans, WhatWasNearBeforeThePoseBecameUncertainIsComparedFromTwiceAsFar) {
+  MultiCloneFilter filter(SE2(), kSmall);
+  Way way(filter);
+  way.add(SE2(1.0, 0.0, 0.0));
+  way.add(SE2(2.0, 0.0, 0.0));
+  filter.distrustWheels(0.2 * 0.2 * Eigen::Matrix3d::Identity());
+  way.add(SE2(1.0, 0.0, 0.0));
+  way.add(SE2(0.5, 0.0, 0.0));
+  filter.propagate({SE2(2.0, 0.0, 1.6), kSmall});  // clones 0 … 3 are 2, 2.5, 3.5 and 5.5 m away
+  EXPECT_THAT(way.scans.worthComparing(0, filter, limits(9)), ElementsAre(2U)) << "1 is turned by more than 1.5 rad";
+  filter.propagate({SE2(0.0, 0.0, -1.6), kSmall});
+  EXPECT_THAT(way.scans.worthComparing(0, filter, limits(9)), ElementsAre(1U, 2U, 3U));
+}
+
+TEST(ReferenceScans, ForgetsTheNewestOfALaser) {
+  MultiCloneFilter filter(SE2(), kSmall);
+  Way way(filter);
+  for (const std::size_t laser : {0, 1, 0, 1}) way.add(SE2(0.1, 0.0, 0.0), laser);
+  way.scans.forgetNewestOf(0, filter);
+  ASSERT_EQ(filter.clones(), 3U);
+  EXPECT_NEAR(filter.clonedPose(*way.scans.newestOf(0)).x, 0.1, 1e-9);
+  EXPECT_NEAR(filter.clonedPose(*way.scans.newestOf(1)).x, 0.4, 1e-9);
+}
+
 TEST(ReferenceScans, ForgetsTheOldest) {
   MultiCloneFilter filter(SE2(), kSmall);
   Way way(filter, 3);

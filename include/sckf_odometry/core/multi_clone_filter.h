@@ -18,7 +18,8 @@ namespace sckf {
 /// Beyond the paper, its error state ξ = (ρ, θ) is a displacement of the world: X = exp(ξ) ⊕ X̂, so that
 ///   X̃ = T(X̂) ξ,  T = [I 𝒥p̂; 0 1].
 /// The motion of the robot leaves ξ as it is, and a displacement between two poses sees nothing but the difference of
-/// their ξ, wherever they are estimated to be: nothing that is common to all poses is ever taken for known.
+/// their ξ, wherever they are estimated to be: nothing that is common to all poses is ever taken for known. The residual
+/// of a displacement is the ξ that leads from its prediction to it, so that corrections may be large.
 class MultiCloneFilter : public LandmarkStates {
  public:
   MultiCloneFilter(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, const StateOptions& states = {});

@@ -6,13 +6,14 @@
 namespace sckf {
 
 /// Drift grows per reference and not per scan, so a reference is kept as long as scans can be compared with it well:
-/// while the next scan, as far away from this one as this one from the last, will probably be within the limits.
+/// while the next scan, as far away from this one as this one from the last, will probably be within the limits. A scan
+/// that cannot be compared with it becomes the reference at once: if the robot is not where the wheels say, the next
+/// scan is nearer to this one.
 /// Zero distances make every scan a reference, which is the algorithm of the paper.
 struct ReferenceOptions {
   double kf_dist_linear = 0.7;   ///< [m] largest way from the reference to a scan that is compared with it
   double kf_dist_angular = 0.5;  ///< [rad] largest rotation
   double kf_min_overlap = 0.6;   ///< a smaller share of points with a partner makes the scan the new reference
-  int kf_max_failures = 2;       ///< so does this many scans in a row that gave no displacement
 
   // A scan that becomes a reference is compared with older ones too, where the method keeps more than one.
   int kept = 16;                    ///< references, the newest among them
@@ -40,7 +41,6 @@ class ReferencePolicy {
  private:
   ReferenceOptions options_;
   SE2 last_;  // reference_from_scan of the scan before
-  int failures_ = 0;
 };
 
 }  // namespace sckf

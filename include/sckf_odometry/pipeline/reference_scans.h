@@ -25,6 +25,8 @@ class ReferenceScans {
 
   /// The scan of the clone that the filter has just made; more than `kept` of a laser are forgotten, the oldest first.
   void add(std::shared_ptr<const PreparedScan> scan, std::size_t laser, int kept, FusionMethod& filter);
+  /// The laser has one.
+  void forgetNewestOf(std::size_t laser, FusionMethod& filter) { forget(*newestOf(laser), filter); }
   void clear() { references_.clear(); }
 
   /// The clones beside the newest that a scan of that laser at the filter's pose is worth comparing with, the most
@@ -43,9 +45,14 @@ class ReferenceScans {
   };
 
   std::vector<std::size_t> clonesOf(std::size_t laser) const;
+  void forget(std::size_t clone, FusionMethod& filter);
 
   std::deque<Reference> references_;
 };
+
+/// Whether a displacement may be far off from what is predicted: where scans have to be searched for, and not only
+/// refined.
+bool isVague(const DisplacementPrediction& prediction);
 
 /// What the filter's covariance does not tell of a displacement over so many references, 3 × 3.
 Eigen::Matrix3d referenceSlack(std::size_t references, const ReferenceOptions& options);

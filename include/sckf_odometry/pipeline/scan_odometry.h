@@ -34,6 +34,7 @@ struct GateOptions {
   double slip_min_agreement = 0.7;    ///< scans match well if they agree by at least so much …
   double slip_max_residual = 3.0;     ///< … the weighted residuals are at most this …
   double slip_min_overlap = 0.6;  ///< … and where they see two directions only, this share of the points has a partner
+  double doubtful_min_agreement = 0.85;  ///< … by which scans agree with a reference that nothing placed, or far away
 };
 
 struct PipelineOptions {
@@ -124,8 +125,11 @@ class ScanOdometry {
   std::shared_ptr<const PreparedScan> prepared(const WaitingScans::Entry& waiting, std::string& rejection) const;
   void compareWithReference(std::size_t clone, ScanReport& report);
   bool fuse(ScanReport& report);
-  void followSlip(const Displacement& displacement);
+  void distrustWheels();
+  void admitFailure(int failures, std::size_t laser);
   void compareWithOlderReferences(ScanReport& report);
+  Match matchWithOlder(const PreparedScan& reference, const PreparedScan& scan,
+                       const DisplacementPrediction& prediction, bool placed) const;
   void allowForCommonErrors(const ScanReport& report);
   Displacement::MatrixDD slackAmongLasers(const Displacement& displacement) const;
   LandmarkStates* landmarkFilter() const;  ///< null where landmarks are not used
@@ -164,6 +168,7 @@ class ScanOdometry {
     RangeOffset range_offset;
     SweepCheck sweeps;
     std::optional<Stamp> taken;  ///< of the last scan of this estimate
+    int failures = 0;            ///< so many scans, the last among them, were placed by no reference
   };
   std::vector<Laser> lasers_;
   OdometryBuffer odometry_;
