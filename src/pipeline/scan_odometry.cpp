@@ -164,7 +164,7 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   if (at_before) followScans(before, *at_before, report);
   if (report.new_reference) {
     compareWithOlderReferences(report);
-    if (laser.failures > 0) admitFailure(laser.failures, report.laser);
+    if (laser.failures > 0) admitFailure(report);
     allowForCommonErrors(report);
     filter_->clone(report.scan->rangeVariances());  // (24)-(27)
     references_.add(report.scan, report.laser, options_.reference.kept, *filter_);

@@ -1,5 +1,6 @@
 // How a scan corrects the estimate: by displacements from references, by landmarks, by a heading.
 #include <Eigen/LU>
+#include <algorithm>
 #include <sstream>
 
 #include "sckf_odometry/core/covariance.h"
@@ -77,14 +78,19 @@ bool ScanOdometry::fuse(ScanReport& report) {
   return true;
 }
 
-/// Scan or wheels are wrong, and nobody knows which: the estimate may be off by a slip. So it is at the scans after it
-/// until one is placed again, and a reference that could not be placed, nor any scan from it, is of no use.
-void ScanOdometry::admitFailure(int failures, std::size_t laser) {
-  if (failures > 1) {
-    references_.forgetNewestOf(laser, *filter_);
-  } else if (options_.gate.trust_scans_on_slip) {
-    distrustWheels();
+/// Scan or wheels are wrong, and unless another laser tells nobody knows which: the estimate may be off by a slip. So
+/// it is at the scans after it until one is placed again, and a reference that could not be placed, nor any scan from
+/// it, is of no use.
+void ScanOdometry::admitFailure(const ScanReport& report) {
+  if (lasers_[report.laser].failures > 1) {
+    references_.forgetNewestOf(report.laser, *filter_);
+    return;
   }
+  const Stamp lately = report.stamp - toDuration(options_.odometry_timeout);
+  const bool others_tell = std::any_of(lasers_.begin(), lasers_.end(), [lately](const Laser& laser) {
+    return laser.failures == 0 && laser.taken && *laser.taken > lately;
+  });
+  if (!others_tell && options_.gate.trust_scans_on_slip) distrustWheels();
 }
 
 void ScanOdometry::distrustWheels() {

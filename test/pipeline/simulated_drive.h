@@ -107,6 +107,21 @@ class SimulatedDrive {
   std::vector<SE2> wheels_;  // each millisecond, in the driver's frame
 };
 
+/// A scan of people all around who move: at no place does it look like another.
+inline LaserScan scanOfACrowd(const SimulatedDrive& drive, int ms) {
+  constexpr std::size_t kWidth = 6;  // of a person, in beams
+  LaserScan scan = drive.scan(ms);
+  std::mt19937_64 random(static_cast<std::uint64_t>(ms));
+  std::uniform_real_distribution<double> distance(0.3, 2.5);
+  std::normal_distribution<double> noise(0.0, 0.02);
+  double near = 0.0;
+  for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
+    if (i % kWidth == 0) near = distance(random);
+    scan.ranges[i] = static_cast<float>(near + noise(random));
+  }
+  return scan;
+}
+
 /// Whether an estimate can be believed at all: finite, its covariances symmetric and positive semi-definite.
 inline ::testing::AssertionResult sound(const Estimate& estimate) {
   const auto fail = [&estimate](const char* what) {

@@ -48,21 +48,6 @@ LaserScan scanElsewhere(const SimulatedDrive& drive, int ms) {
   return scan;
 }
 
-/// A scan of people all around who move: at no place does it look like another.
-LaserScan scanOfACrowd(const SimulatedDrive& drive, int ms) {
-  constexpr std::size_t kWidth = 6;  // of a person, in beams
-  LaserScan scan = drive.scan(ms);
-  std::mt19937_64 random(static_cast<std::uint64_t>(ms));
-  std::uniform_real_distribution<double> distance(0.3, 2.5);
-  std::normal_distribution<double> noise(0.0, 0.02);
-  double near = 0.0;
-  for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
-    if (i % kWidth == 0) near = distance(random);
-    scan.ranges[i] = static_cast<float>(near + noise(random));
-  }
-  return scan;
-}
-
 /// Over (from, to] there are people all around at every scan.
 void driveThroughACrowd(const SimulatedDrive& drive, Driven& driven, int from, int to) {
   for (int ms = from + 20; ms <= to; ms += 20) {

@@ -126,7 +126,7 @@ class ScanOdometry {
   void compareWithReference(std::size_t clone, ScanReport& report);
   bool fuse(ScanReport& report);
   void distrustWheels();
-  void admitFailure(int failures, std::size_t laser);
+  void admitFailure(const ScanReport& report);
   void compareWithOlderReferences(ScanReport& report);
   Match matchWithOlder(const PreparedScan& reference, const PreparedScan& scan,
                        const DisplacementPrediction& prediction, bool placed) const;
