@@ -32,6 +32,8 @@ std::vector<DeskewingPoint> simulateDeskewing(const DeskewingOptions& options, c
     PipelineOptions pipeline;
     DeskewingPoint point;
     point.yaw_rate = yaw_rate;
+    point.estimated = follow(path, sweepingLaser(options, path), pipeline, options.run);
+    pipeline.sweep_duration_std = 0.0;
     point.without = follow(path, sweepingLaser(options, path), pipeline, options.run);
     pipeline.deskew = true;
     point.with = follow(path, sweepingLaser(options, path), pipeline, options.run);

@@ -17,8 +17,8 @@ namespace {
 using MatrixDD = Displacement::MatrixDD;
 using MatrixD3 = Displacement::MatrixD3;
 
-/// ∂²L/∂x² of one residual.
-Eigen::Matrix3d hessianOf(const RobustKernel& kernel, const Residual& residual, const ResidualTerms& t) {
+/// ∂²L/∂x² of one residual. Inline, as addDerivatives, because they are called for each.
+inline Eigen::Matrix3d hessianOf(const RobustKernel& kernel, const Residual& residual, const ResidualTerms& t) {
   Eigen::Matrix3d hessian = kernel.slope(t.e) * t.A * t.A.transpose();
   hessian(2, 2) -= kernel.influence(t.e) * residual.precision * residual.normal.dot(t.lever);
   return hessian;
@@ -70,6 +70,21 @@ struct BeamBlock {
   Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
 };
 
+/// What the normal equations have more by a constant c of the laser, with b = ∂e/∂c.
+struct ByConstant {
+  Eigen::Vector3d coupling = Eigen::Vector3d::Zero();  // Σ w A b
+  double information = 0.0;                            // Σ w b²
+  double gradient = 0.0;                               // Σ w e b
+
+  /// shift: how much more the current point is before the line when c is more.
+  void add(double weight, const Residual& residual, const ResidualTerms& t, double shift) {
+    const double b = shift * residual.precision;
+    coupling += weight * b * t.A;
+    information += weight * b * b;
+    gradient += weight * b * t.e;
+  }
+};
+
 /// Derivatives of the loss at the solution, by the displacement and by the ranges.
 struct LossDerivatives {
   explicit LossDerivatives(const AlignmentProblem& problem)
@@ -80,10 +95,25 @@ struct LossDerivatives {
   Eigen::Matrix3Xd by_reference;                          // ∂²L/∂x∂z_k, 3 × M_k
   Eigen::Matrix3Xd by_current;                            // ∂²L/∂x∂z_{k+m}, 3 × M_{k+m}
   std::vector<BeamBlock> blocks;                          // of which the hessian is the sum
-  Eigen::Matrix4d with_offset = Eigen::Matrix4d::Zero();  // Σ w a aᵀ, a = ∂e/∂(x, c), c: an offset of all ranges
-  Eigen::Vector4d gradient_with_offset = Eigen::Vector4d::Zero();  // Σ w e a
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  // Σ w A Aᵀ
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();     // Σ w e A
+  ByConstant by_range_offset;
+  ByConstant by_sweep_duration;
   double loss_weight = 0.0;
   double loss_square = 0.0;
+
+  double excess() const { return std::max(1.0, loss_square / loss_weight); }  // of the residuals over their noise
+
+  /// Of the constant, the displacement eliminated. Nothing where a direction is not seen: the constant would make up
+  /// for what the prediction is wrong by there.
+  ConstantEvidence evidence(const ByConstant& constant, const ObservableDirections& seen) const {
+    if (seen.dimension() < 3) return {};
+    const Eigen::Vector3d eliminated = information.ldlt().solve(constant.coupling);
+    const double left = constant.information - constant.coupling.dot(eliminated);
+    const double value = -(constant.gradient - eliminated.dot(gradient)) / left;
+    if (!(left > 0.0) || !std::isfinite(value)) return {};
+    return {value, left, 0.0};
+  }
 };
 
 /// A surface's line turns and shifts with every range that it was fitted to. Returns by how much more the current point
@@ -106,8 +136,8 @@ double addSurfaceDerivatives(const AlignmentProblem& problem, const Residual& re
   return together;
 }
 
-void addDerivatives(const AlignmentProblem& problem, const Residual& residual, const RigidMotion& x,
-                    const ResidualTerms& t, LossDerivatives& out) {
+inline void addDerivatives(const AlignmentProblem& problem, const Residual& residual, const RigidMotion& x,
+                           const ResidualTerms& t, LossDerivatives& out) {
   const double influence = problem.kernel().influence(t.e);
   const double slope = problem.kernel().slope(t.e);
   const Eigen::Matrix3d hessian = hessianOf(problem.kernel(), residual, t);
@@ -133,9 +163,12 @@ void addDerivatives(const AlignmentProblem& problem, const Residual& residual, c
     by_offset += shift;
   }
   const double w = problem.kernel().weight(t.e);
-  const Eigen::Vector4d a(t.A.x(), t.A.y(), t.A.z(), by_offset * residual.precision);
-  out.with_offset += w * a * a.transpose();
-  out.gradient_with_offset += w * t.e * a;
+  out.information += w * t.A * t.A.transpose();
+  out.gradient += w * t.e * t.A;
+  out.by_range_offset.add(w, residual, t, by_offset);
+  const Eigen::Vector2d by_duration = x.C * problem.current().bySweepDuration(c) -
+                                      problem.reference().bySweepDuration(static_cast<std::size_t>(residual.reference));
+  out.by_sweep_duration.add(w, residual, t, residual.normal.dot(by_duration));
 }
 
 LossDerivatives differentiate(const AlignmentProblem& problem, const RigidMotion& x, const EstimationOptions& options) {
@@ -184,10 +217,9 @@ MatrixDD matchingNoise(const MatrixDD& range_covariance, const MatrixDD& seen_co
   return half * excess.asDiagonal() * half.transpose();
 }
 
-/// The displacement eliminated. Residuals that are larger than the noise tell less. Nothing where a direction is not
-/// seen: the offset would make up for what the prediction is wrong by there.
-RangeOffsetEvidence rangeOffset(const AlignmentProblem& problem, const LossDerivatives& loss,
-                                const ObservableDirections& seen) {
+/// Residuals that are larger than the noise tell less.
+ConstantEvidence rangeOffset(const AlignmentProblem& problem, const LossDerivatives& loss,
+                             const ObservableDirections& seen) {
   // Of surfaces fitted across what is not straight, as far as noise lets them: by simulation 1 to 4 mm for 1 cm of
   // noise, which turn a displacement by next to nothing.
   constexpr double kBias = 20.0;  // [1/m]
@@ -196,17 +228,18 @@ RangeOffsetEvidence rangeOffset(const AlignmentProblem& problem, const LossDeriv
   // offset in every pair of scans that are near each other: 8 cm, after a while of scans that are compared with the
   // last one.
   constexpr double kDerivativeNoise = 0.03;
-  if (seen.dimension() < 3) return {};
-  const Eigen::Vector3d coupling = loss.with_offset.topRightCorner<3, 1>();
-  const Eigen::Vector3d eliminated = loss.with_offset.topLeftCorner<3, 3>().ldlt().solve(coupling);
-  const double information = loss.with_offset(3, 3) - coupling.dot(eliminated);
-  const double gradient = loss.gradient_with_offset(3) - eliminated.dot(loss.gradient_with_offset.head<3>());
-  const double value = -gradient / information;
-  if (!(information > 0.0) || !std::isfinite(value)) return {};
+  const ConstantEvidence told = loss.evidence(loss.by_range_offset, seen);
   const double noise = std::max(problem.reference().range_noise, problem.current().range_noise);
-  const double derivative = noise * std::sqrt(information / loss.loss_weight);  // rms, the displacement eliminated
+  const double derivative = noise * std::sqrt(told.information / loss.loss_weight);  // rms, the displacement eliminated
   if (derivative < kDerivativeNoise) return {};
-  return {value, information / std::max(1.0, loss.loss_square / loss.loss_weight), kBias * noise * noise};
+  return {told.value, told.information / loss.excess(), kBias * noise * noise};
+}
+
+ConstantEvidence sweepDuration(const LossDerivatives& loss, const ObservableDirections& seen) {
+  // On recorded logs turns to the left, turns to the right and ways straight on tell durations that differ by so much.
+  constexpr double kBias = 0.005;  // [s]
+  const ConstantEvidence told = loss.evidence(loss.by_sweep_duration, seen);
+  return {told.value, told.information / loss.excess(), kBias};
 }
 
 }  // namespace
@@ -232,6 +265,7 @@ std::optional<DisplacementEstimate> estimateDisplacement(const AlignmentProblem&
   z.matching_noise = matchingNoise(z.covariance(), seenCovariance(loss, seen, hessian), loss.blocks.size(),
                                    options.matching_inflation);
   estimate.range_offset = rangeOffset(problem, loss, seen);
+  estimate.sweep_duration = sweepDuration(loss, seen);
   estimate.residual_rms = std::sqrt(loss.loss_square / loss.loss_weight);
   return estimate;
 }

@@ -81,15 +81,19 @@ LaserScan thinned(const LaserScan& scan, std::size_t max_beams) {
   return thin;
 }
 
-/// What was measured t_i after the stamp, to where the robot was at the stamp: p ← C(φ(t_i)) p + t(t_i), and the rays
-/// with it.
-void undo(const ScanMotion& motion, double time_increment, ScannedPoints& points) {
+/// What beam i measured, from where the robot was then to where it was at the stamp: p ← C(φ_i) p + t_i, and the rays
+/// with it. stamp_from_base_at: by the beam.
+template <typename StampFromBaseAt>
+void undo(const StampFromBaseAt& stamp_from_base_at, ScannedPoints& points) {
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const SE2 stamp_from_base = motion.at(points.beam[i] * time_increment);
+    const RigidMotion stamp_from_base(stamp_from_base_at(points.beam[i]));
     points.point[i] = stamp_from_base * points.point[i];
-    points.ray[i] = stamp_from_base.rotation() * points.ray[i];
+    points.ray[i] = stamp_from_base.C * points.ray[i];
   }
 }
+
+/// Of the beams of a scan: -1/2 the first, 1/2 the last.
+double shareOf(int beam, std::size_t beams) { return beam / static_cast<double>(beams - 1) - 0.5; }
 
 ScannedPoints readings(const LaserScan& scan, const Eigen::Isometry3d& base_from_laser, double range_min,
                        double range_max, double offset) {
@@ -126,6 +130,11 @@ Eigen::VectorXd PreparedScan::rangeVariances() const {
   return Eigen::VectorXd::Constant(static_cast<Eigen::Index>(beams), range_noise * range_noise);
 }
 
+Eigen::Vector2d PreparedScan::bySweepDuration(std::size_t i) const {
+  const Eigen::Vector2d velocity = sweep.twist.head<2>() + sweep.twist.z() * quarterTurn(points.point[i]);
+  return shareOf(points.beam[i], beams) * velocity;
+}
+
 std::shared_ptr<const PreparedScan> prepareScan(const LaserScan& scan, const Eigen::Isometry3d& base_from_laser,
                                                 const ScanOptions& options, std::string* rejection,
                                                 const ScanMotion& motion) {
@@ -146,7 +155,12 @@ std::shared_ptr<const PreparedScan> prepareScan(const LaserScan& scan, const Eig
   const double range_min = std::max(options.range_min, scan.range_min);
   const double range_max = std::min(options.range_max, scan.range_max);
   prepared->points = readings(scan, base_from_laser, range_min, range_max, options.range_offset);
-  if (!motion.atRest()) undo(motion, scan.time_increment, prepared->points);
+  if (!motion.atRest()) {
+    undo([&](int beam) { return motion.at(beam * scan.time_increment); }, prepared->points);
+  } else if (prepared->beams > 1) {
+    prepared->sweep = options.sweep;
+    undo([&](int beam) { return options.sweep.at(shareOf(beam, prepared->beams)); }, prepared->points);
+  }
   if (prepared->size() < static_cast<std::size_t>(options.min_points)) {
     std::ostringstream reason;
     reason << prepared->size() << " of " << scan.ranges.size() << " ranges are finite and within [" << range_min << ", "
@@ -170,6 +184,7 @@ std::shared_ptr<const PreparedScan> setAside(const PreparedScan& scan, const std
   rest->angle_increment = scan.angle_increment;
   rest->range_noise = scan.range_noise;
   rest->range_offset = scan.range_offset;
+  rest->sweep = scan.sweep;
   rest->free_space = scan.free_space;
   rest->set_aside = scan.set_aside;
   for (std::size_t i = 0; i < scan.size(); ++i) {

@@ -208,8 +208,11 @@ Match concluded(const std::optional<Alignment>& aligned, const MatcherOptions& o
   match.pairs = aligned->problem.pairs();
   match.overlap = aligned->problem.overlap();
   match.agreement = aligned->problem.agreement();
-  match.residual_rms = estimate ? estimate->residual_rms : 0.0;
-  if (estimate) match.range_offset = estimate->range_offset;
+  if (estimate) {
+    match.residual_rms = estimate->residual_rms;
+    match.range_offset = estimate->range_offset;
+    match.sweep_duration = estimate->sweep_duration;
+  }
   if (match.overlap < options.min_overlap) {
     match.failure = MatchFailure::kNoOverlap;
   } else if (match.agreement < options.min_agreement) {

@@ -50,18 +50,22 @@ void checkPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance) {
   if (!problem.empty()) throw std::invalid_argument(problem);
 }
 
+LaserConstants constantsOf(const PipelineOptions& options) {
+  return {LaserConstant(options.range_offset_std), LaserConstant(options.sweep_duration_std)};
+}
+
 }  // namespace
 
 ScanOdometry::ScanOdometry(const PipelineOptions& options, const SE2& odom_from_base, const Eigen::Matrix3d& covariance)
     : options_(options),
       matcher_(options.matcher),
-      lasers_(options.lasers,
-              {ReferencePolicy(options.reference), RangeOffset(options.range_offset_std), {}, std::nullopt}),
+      lasers_(options.lasers, {ReferencePolicy(options.reference), constantsOf(options), {}, std::nullopt}),
       odometry_(options.motion, options.odometry_timeout),
       imu_(options.imu.timeout),
       twist_(options.twist_window),
       start_(odom_from_base),
       start_covariance_(covariance),
+      filter_twist_(options.twist_window),
       landmarks_(options.landmarks) {
   checkMethod(options.method);
   checkStates(options);
@@ -174,7 +178,7 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   report.in_map = inMap();
   report.calibration = filter_->calibration();
   report.gyro_bias = filter_->gyroBias();
-  report.range_offset = laser.range_offset;
+  report.laser_constants = laser.constants;
   report.gyro_time = std::exchange(gyro_time_, 0.0);
   report.stands = standstill_.stands(options_.standstill);
   leaveTrail();
@@ -187,7 +191,8 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
 std::shared_ptr<const PreparedScan> ScanOdometry::prepared(const WaitingScans::Entry& waiting,
                                                            std::string& rejection) const {
   ScanOptions options = options_.scan;
-  options.range_offset = lasers_[waiting.laser].range_offset.value();
+  options.range_offset = lasers_[waiting.laser].constants.range_offset.value();
+  options.sweep = evenSweep(waiting);
   return prepareScan(waiting.scan, waiting.base_from_laser, options, &rejection, motionDuring(waiting));
 }
 
@@ -221,11 +226,13 @@ void ScanOdometry::setOptions(const PipelineOptions& options) {
   matcher_ = ScanMatcher(options.matcher);
   for (Laser& laser : lasers_) {
     laser.policy.setOptions(options.reference);
-    laser.range_offset.setStd(options.range_offset_std);
+    laser.constants.range_offset.setStd(options.range_offset_std);
+    laser.constants.sweep_duration.setStd(options.sweep_duration_std);
   }
   landmarks_.setOptions(options.landmarks);
   odometry_.setLimits(options.motion, options.odometry_timeout);
   twist_.setDuration(options.twist_window);
+  filter_twist_.setDuration(options.twist_window);
 }
 
 void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp) {
@@ -241,6 +248,7 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
   }
   trail_.clear();
   filter_stamp_ = stamp;
+  filter_twist_ = TwistWindow(options_.twist_window);
   odometry_.discardBefore(stamp);
   wheels_known_ = true;
   standstill_.interrupt();
@@ -248,7 +256,7 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
   references_.clear();
   for (Laser& laser : lasers_) {
     laser.policy = ReferencePolicy(options_.reference);
-    laser.range_offset = RangeOffset(options_.range_offset_std);
+    laser.constants = constantsOf(options_);
     laser.taken.reset();
     laser.failures = 0;
   }

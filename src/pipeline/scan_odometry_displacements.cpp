@@ -45,7 +45,10 @@ void ScanOdometry::compareWithReference(std::size_t clone, ScanReport& report) {
   }
   Laser& laser = lasers_[report.laser];
   laser.failures = used ? 0 : laser.failures + 1;
-  if (used) laser.range_offset.add(report.match.range_offset, report.scan->range_offset);
+  if (used) {
+    laser.constants.range_offset.add(report.match.range_offset, report.scan->range_offset);
+    laser.constants.sweep_duration.add(report.match.sweep_duration, report.scan->sweep.duration);
+  }
   const SE2 reference_from_scan = filter_->predictedDisplacementFrom(clone).reference_from_current;
   report.new_reference = laser.policy.replaces(reference_from_scan, report.match.overlap, used);
 }

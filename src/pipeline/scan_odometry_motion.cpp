@@ -1,5 +1,6 @@
 // How the estimate follows the motion between scans: by wheels, by an IMU, by scans alone where the wheels are silent.
 #include <algorithm>
+#include <cmath>
 
 #include "sckf_odometry/core/covariance.h"
 #include "sckf_odometry/pipeline/scan_odometry.h"
@@ -24,6 +25,18 @@ ScanMotion ScanOdometry::motionDuring(const WaitingScans::Entry& waiting) const 
   return motion;
 }
 
+/// By the motion up to the stamp: a scan need not wait for what comes after. A twist that the robot cannot have, as of
+/// odometry with wrong stamps, tells nothing.
+EvenSweep ScanOdometry::evenSweep(const WaitingScans::Entry& waiting) const {
+  if (waiting.sweep.deskewing == Deskewing::kDone) return {};
+  const Twist twist = filter_twist_.twist();
+  const MotionLimits& limits = options_.motion;
+  const bool known = twist.covariance(0, 0) < Twist::kUnknownVariance &&
+                     twist.mean.head<2>().norm() <= limits.max_speed && std::abs(twist.mean.z()) <= limits.max_yaw_rate;
+  if (!known) return {};
+  return {twist.mean, lasers_[waiting.laser].constants.sweep_duration.value()};
+}
+
 /// Without scans the filter follows the wheels at a distance, so that the buffer stays small; from sample to sample, so
 /// that it makes no difference when the samples arrived. A scan that waits for the end of its sweep holds it back.
 void ScanOdometry::followAtADistance() {
@@ -42,10 +55,13 @@ void ScanOdometry::propagateTo(Stamp stamp) {
   for (const OdometryBuffer::Step& step : odometry_.steps(filter_stamp_, stamp)) {
     const OdometryIncrement motion = increment(step, standstill_);
     const double dt = seconds(step.to.stamp - step.from.stamp);
+    filter_twist_.add(filter_->refined(motion), dt);
     filter_->propagate(motion);
     filter_->age(dt);
     for (const MotionMeasurement& z : motion.measured) gyro_time_ += z.bias_time;
-    if (step.guess) wheels_known_ = false;
+    if (!step.guess) continue;
+    wheels_known_ = false;
+    filter_twist_ = TwistWindow(options_.twist_window);
   }
   filter_stamp_ = stamp;
   odometry_.discardBefore(stamp);

@@ -281,8 +281,11 @@ sckf_odometry::Status toStatus(const ScanReport& report, const std::string& meth
   }
   if (report.reference_stamp != Stamp(0)) status.reference_age = seconds(report.stamp - report.reference_stamp);
   const Eigen::Vector4d calibration_std = report.calibration.covariance.diagonal().cwiseSqrt();
-  status.range_offset = report.range_offset.value();
-  status.range_offset_std = std::sqrt(report.range_offset.variance());
+  const auto& [range_offset, sweep_duration] = report.laser_constants;
+  status.range_offset = range_offset.value();
+  status.range_offset_std = std::sqrt(range_offset.variance());
+  status.sweep_duration = sweep_duration.value();
+  status.sweep_duration_std = std::sqrt(sweep_duration.variance());
   status.calibration_distance = report.calibration.error(0);
   status.calibration_distance_std = calibration_std(0);
   status.calibration_rotation = report.calibration.error(1);

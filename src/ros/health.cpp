@@ -44,7 +44,7 @@ std::string silenceOf(const std::string& what, double silence, const std::string
 
 Health::Health(const std::string& odometry_source, const std::vector<std::string>& scan_topics)
     : odometry_source_(odometry_source) {
-  for (const std::string& topic : scan_topics) lasers_.push_back({topic, {}, RangeOffset(0.0)});
+  for (const std::string& topic : scan_topics) lasers_.push_back({topic, {}, LaserConstants()});
 }
 
 void Health::scanCame(std::size_t laser, const ros::Time& stamp, const ros::Time& now) {
@@ -75,7 +75,7 @@ void Health::scanTaken(const ScanReport& report) {
   if (!report.estimate) return;
   last_stamp_ = report.stamp;
   calibration_ = report.calibration;
-  lasers_[report.laser].range_offset = report.range_offset;
+  lasers_[report.laser].constants = report.laser_constants;
   gyro_bias_ = report.gyro_bias;
   stands_ = report.stands;
   if (report.heading == HeadingUse::kUsed) ++headings_used_;
@@ -187,10 +187,13 @@ void Health::addScans(const Conditions& conditions, const ros::Time& now, Status
   for (const auto& [deskewing, count] : deskewing_) {
     if (deskewing != Deskewing::kOff) status.add("scans " + toString(deskewing), count);
   }
+  const auto add_constant = [&status](const std::string& key, const LaserConstant& constant) {
+    if (constant.variance() == 0.0) return;
+    status.addf(key, "%.4f +- %.4f", constant.value(), std::sqrt(constant.variance()));
+  };
   for (const Laser& laser : lasers_) {
-    const RangeOffset& offset = laser.range_offset;
-    if (offset.variance() == 0.0) continue;
-    status.addf("range offset on " + laser.topic + " [m]", "%.4f +- %.4f", offset.value(), std::sqrt(offset.variance()));
+    add_constant("range offset on " + laser.topic + " [m]", laser.constants.range_offset);
+    add_constant("sweep duration on " + laser.topic + " [s]", laser.constants.sweep_duration);
   }
   status.add("last scan", last_scan_);
   if (timed_ == 0) return;

@@ -188,6 +188,7 @@ List scanParameters(PipelineOptions& pipeline) {
       number("range_noise_min", scan.range_noise_min, aboveUpTo(0.0, 10.0), "m"),
       number("range_noise_max", scan.range_noise_max, aboveUpTo(0.0, 10.0), "m"),
       number("range_offset_std", pipeline.range_offset_std, within(0.0, 1.0), "m"),
+      number("sweep_duration_std", pipeline.sweep_duration_std, within(0.0, 1.0), "s"),
       number("min_points", scan.min_points, within(3, 1000000), "points"),
       number("surface_straightness", scan.surface.straightness, aboveUpTo(0.0, 1000.0)),
       number("surface_length", scan.surface.length, aboveUpTo(0.0, 1000.0), "m"),

@@ -16,9 +16,11 @@ void deskewing(const Arguments& arguments) {
   ProgressBar progress(yaw_rates.size());
   const auto points = simulateDeskewing(arguments.deskewing, yaw_rates, [&progress] { progress.advance(); });
   progress.finish();
-  CsvFile table(arguments.file("deskewing"), "yaw_rate,sweep,with_position,with_yaw,without_position,without_yaw");
+  CsvFile table(arguments.file("deskewing"),
+                "yaw_rate,sweep,with_position,with_yaw,estimated_position,estimated_yaw,without_position,without_yaw");
   for (const DeskewingPoint& p : points) {
-    table.row({p.yaw_rate, arguments.deskewing.sweep, p.with.position, p.with.yaw, p.without.position, p.without.yaw});
+    table.row({p.yaw_rate, arguments.deskewing.sweep, p.with.position, p.with.yaw, p.estimated.position,
+               p.estimated.yaw, p.without.position, p.without.yaw});
   }
 }
 

@@ -53,7 +53,7 @@ class Statistics {
     if (report.new_reference) reference_times_.push_back(time);
     older_references_ += static_cast<std::size_t>(report.older_references);
     landmarks_used_ += static_cast<std::size_t>(report.landmarks_used);
-    range_offset_ = report.range_offset;
+    constants_ = report.laser_constants;
     most_landmarks_ = std::max(most_landmarks_, report.landmarks.size());
   }
 
@@ -72,15 +72,19 @@ class Statistics {
       std::printf("older references used %zu times, by %zu scans that became one\n", older_references_,
                   reference_times_.size());
     }
-    if (range_offset_.variance() > 0.0) {
-      std::printf("range offset %.4f +- %.4f m\n", range_offset_.value(), std::sqrt(range_offset_.variance()));
-    }
+    printConstant("range offset", constants_.range_offset, "m");
+    printConstant("sweep duration", constants_.sweep_duration, "s");
     printTimes("time of a scan", times_);
     printTimes("time of a scan that became a reference", reference_times_);
     std::printf("%.1f s of log in %.2f s: %.0f times real time\n", log_duration, wall_time, log_duration / wall_time);
   }
 
  private:
+  static void printConstant(const char* what, const LaserConstant& constant, const char* unit) {
+    if (constant.variance() == 0.0) return;
+    std::printf("%s %.4f +- %.4f %s\n", what, constant.value(), std::sqrt(constant.variance()), unit);
+  }
+
   static void printTimes(const char* what, std::vector<double>& times) {
     if (times.empty()) return;
     std::sort(times.begin(), times.end());
@@ -94,7 +98,7 @@ class Statistics {
   std::map<ScanOutcome, std::size_t> outcomes_;
   std::map<Deskewing, std::size_t> deskewing_;
   std::size_t older_references_ = 0;
-  RangeOffset range_offset_{0.0};  // of the last scan's laser
+  LaserConstants constants_;  // of the last scan's laser
   std::size_t landmarks_used_ = 0;
   std::size_t most_landmarks_ = 0;
   std::vector<double> times_;            // [s] of each scan …

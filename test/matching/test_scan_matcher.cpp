@@ -348,34 +348,40 @@ TEST(MatchingNoise, IsWhatRangeNoiseDoesNotExplainTimesItsInflation) {
   EXPECT_LT(thrice.nees, seen.nees);
 }
 
-/// The mean of what matches tell, each by its information.
-RangeOffsetEvidence rangeOffsetTold(double offset, double noise) {
-  SimulatedLaser laser;
-  laser.noise = noise;
-  laser.offset = offset;
-  double information = 0.0;
-  double sum = 0.0;
-  double bias = 0.0;
+/// The mean of what matches at sixty places tell, each by its information. told_at: what the match of a place tells.
+template <typename ToldAt>
+ConstantEvidence meanTold(const ToldAt& told_at) {
+  ConstantEvidence mean;
   for (int i = 0; i < 60; ++i) {
     std::mt19937_64 random(static_cast<std::uint64_t>(i));
     std::uniform_real_distribution<double> within(-1.0, 1.0);
     const SE2 start(within(random), within(random), 3.0 * within(random));
     const SE2 motion(0.5 * within(random), 0.1 * within(random), 0.4 * within(random));
+    const ConstantEvidence told = told_at(start, motion, random);
+    mean.information += told.information;
+    mean.value += told.information * told.value;
+    mean.bias_std += told.information * told.bias_std;
+  }
+  EXPECT_GT(mean.information, 0.0);
+  return {mean.value / mean.information, mean.information, mean.bias_std / mean.information};
+}
+
+ConstantEvidence rangeOffsetTold(double offset, double noise) {
+  SimulatedLaser laser;
+  laser.noise = noise;
+  laser.offset = offset;
+  return meanTold([&laser](const SE2& start, const SE2& motion, std::mt19937_64& random) {
     const Match match = matchIn(room(), start, motion, laser, prediction(motion), &random);
     EXPECT_TRUE(match.displacement) << toString(match.failure);
-    information += match.range_offset.information;
-    sum += match.range_offset.information * match.range_offset.value;
-    bias += match.range_offset.information * match.range_offset.bias_std;
-  }
-  EXPECT_GT(information, 0.0);
-  return {sum / information, information, bias / information};
+    return match.range_offset;
+  });
 }
 
 TEST(RangeOffset, IsToldByHowScansFallTogether) {
   for (const double noise : {0.005, 0.01, 0.02}) {
-    const RangeOffsetEvidence none = rangeOffsetTold(0.0, noise);
+    const ConstantEvidence none = rangeOffsetTold(0.0, noise);
     for (const double offset : {0.02, -0.02}) {
-      const RangeOffsetEvidence told = rangeOffsetTold(offset, noise);
+      const ConstantEvidence told = rangeOffsetTold(offset, noise);
       EXPECT_NEAR(told.value - none.value, -offset, 0.2 * std::abs(offset)) << "range noise " << noise;
     }
   }
@@ -384,7 +390,7 @@ TEST(RangeOffset, IsToldByHowScansFallTogether) {
 /// Their noise biases what matches tell, the more the larger it is.
 TEST(RangeOffset, WhatNoiseTellsOfItIsAllowedFor) {
   for (const double noise : {0.01, 0.02}) {
-    const RangeOffsetEvidence none = rangeOffsetTold(0.0, noise);
+    const ConstantEvidence none = rangeOffsetTold(0.0, noise);
     EXPECT_NEAR(none.bias_std, 24.0 * noise * noise, 4.0 * noise * noise)
         << "of the noisier scan: 20 times its variance";
     EXPECT_LT(std::abs(none.value), 3.0 * none.bias_std + 2.0 / std::sqrt(none.information)) << "noise " << noise;
@@ -396,6 +402,46 @@ TEST(RangeOffset, ScansThatDoNotSeeAllDirectionsTellNothingOfIt) {
   ASSERT_TRUE(match.displacement) << toString(match.failure);
   ASSERT_EQ(match.displacement->dimension(), 2);
   EXPECT_EQ(match.range_offset.information, 0.0);
+}
+
+/// Of scans whose sweeps take so long, about their stamps, while the robot makes the motion from one to the next within
+/// 0.4 s; so much of the duration has been undone.
+ConstantEvidence sweepDurationTold(double duration, double undone) {
+  SimulatedLaser laser;
+  laser.noise = 0.01;
+  laser.time_increment = duration / (laser.beams - 1);
+  return meanTold([&](const SE2& start, const SE2& motion, std::mt19937_64& random) {
+    ScanOptions options;
+    options.sweep = {motion.vector() / 0.4, undone};
+    const auto swept = [&](const SE2& world_from_base) {
+      const auto along = [&](double t) {
+        return compose(world_from_base, SE2((t - 0.5 * duration) * options.sweep.twist));
+      };
+      return prepareScan(simulateSweep(room(), along, laser, &random), laser.base_from_laser, options);
+    };
+    const auto reference = swept(start);
+    const auto current = swept(compose(start, motion));
+    const Match match = ScanMatcher({}).match(*reference, *current, prediction(motion));
+    EXPECT_TRUE(match.displacement) << toString(match.failure);
+    EXPECT_EQ(match.sweep_duration.bias_std, 0.005);
+    return match.sweep_duration;
+  });
+}
+
+TEST(SweepDuration, IsToldByHowScansFallTogether) {
+  for (const double duration : {0.05, -0.05, 0.0}) {
+    for (const double undone : {0.0, 0.02}) {
+      const ConstantEvidence told = sweepDurationTold(duration, undone);
+      EXPECT_NEAR(told.value, duration - undone, 0.006) << duration << " s, of which are undone " << undone;
+      EXPECT_LT(1.0 / std::sqrt(told.information), 0.003);
+    }
+  }
+}
+
+TEST(SweepDuration, ARobotThatStandsTellsNothingOfIt) {
+  const Match match = matchIn(room(), SE2(), kDisplacement, SimulatedLaser(), prediction(kDisplacement));
+  ASSERT_TRUE(match.displacement) << toString(match.failure);
+  EXPECT_EQ(match.sweep_duration.information, 0.0);
 }
 
 TEST(BothWays, ErrLessThanOneAmongRoughWalls) {

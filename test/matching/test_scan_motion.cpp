@@ -128,5 +128,52 @@ TEST(Deskewing, AtRestChangesNothing) {
   }
 }
 
+/// Of the turning robot, whose motion is even.
+EvenSweep evenSweep(double duration) { return {Eigen::Vector3d(0.7, 0.0, 2.0), duration}; }
+
+/// By a laser as above, about the stamp.
+std::shared_ptr<const PreparedScan> sweptAbout(const EvenSweep& taken, const EvenSweep& undone) {
+  const SimulatedLaser laser = sweepingLaser();
+  const auto along = [&taken](double t) { return taken.at(t / 0.1 - 0.5); };
+  ScanOptions options;
+  options.sweep = undone;
+  return prepareScan(simulateSweep(room(), along, laser), laser.base_from_laser, options);
+}
+
+TEST(EvenSweep, IsUndoneAboutTheStamp) {
+  const double with = farthestFromWalls(*sweptAbout(evenSweep(0.1), evenSweep(0.1)));
+  const double without = farthestFromWalls(*sweptAbout(evenSweep(0.1), {}));
+  EXPECT_LT(with, 1e-5) << "m; without: " << without;
+  EXPECT_GT(without, 0.1);
+  EXPECT_LT(farthestFromWalls(*sweptAbout(evenSweep(-0.1), evenSweep(-0.1))), 1e-5) << "the last beam first";
+}
+
+TEST(EvenSweep, ItsDerivativeByTheDurationIsThatOfThePoints) {
+  const double step = 1e-4;
+  const auto scan = sweptAbout(evenSweep(0.1), evenSweep(0.02));
+  const auto longer = sweptAbout(evenSweep(0.1), evenSweep(0.02 + step));
+  const auto shorter = sweptAbout(evenSweep(0.1), evenSweep(0.02 - step));
+  ASSERT_EQ(scan->size(), 361U);
+  for (std::size_t i = 0; i < scan->size(); ++i) {
+    const Eigen::Vector2d numerical = (longer->points.point[i] - shorter->points.point[i]) / (2.0 * step);
+    // Of the second order is left what the translation turns by while the robot turns: 2 rad/s · 0.7 m/s · 0.02 s.
+    EXPECT_LT((scan->bySweepDuration(i) - numerical).norm(), 0.03) << i << ": " << numerical.transpose();
+  }
+}
+
+TEST(EvenSweep, AMotionThatIsToldBeamByBeamIsUndoneInstead) {
+  ScanMotion motion;
+  motion.add(SE2(0.07, 0.0, 0.2), 0.1);
+  ScanOptions options;
+  options.sweep = evenSweep(0.1);
+  const SimulatedLaser laser = sweepingLaser();
+  const LaserScan scan = simulateSweep(
+      room(), [&motion](double t) { return motion.at(t); }, laser);
+  const auto prepared = prepareScan(scan, laser.base_from_laser, options, nullptr, motion);
+  EXPECT_LT(farthestFromWalls(*prepared), 1e-5);
+  EXPECT_EQ(prepared->sweep.duration, 0.0);
+  EXPECT_EQ(prepared->bySweepDuration(0).norm(), 0.0);
+}
+
 }  // namespace
 }  // namespace sckf::test

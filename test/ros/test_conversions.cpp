@@ -267,8 +267,9 @@ TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
   report.landmarks.resize(7);
   report.calibration.error << 0.03, -0.02, 0.01, 0.07;
   report.calibration.covariance = Eigen::Vector4d(1e-4, 4e-4, 9e-4, 16e-4).asDiagonal();
-  report.range_offset = RangeOffset(0.02);
-  report.range_offset.add({0.01, 30.0 / 4e-4, 0.0}, 0.0);
+  report.laser_constants = {LaserConstant(0.02), LaserConstant(0.01)};
+  report.laser_constants.range_offset.add({0.01, 30.0 / 4e-4, 0.0}, 0.0);
+  report.laser_constants.sweep_duration.add({0.006, 30.0 / 1e-4, 0.0}, 0.0);
   report.gyro_bias = {0.01, 4e-6};
   report.gyro_time = 0.1;
   report.heading = HeadingUse::kContradicts;
@@ -303,6 +304,8 @@ TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
   EXPECT_NEAR(status.calibration_laser_ahead_std, 0.04, 1e-12);
   EXPECT_NEAR(status.range_offset, 0.005, 1e-12);
   EXPECT_NEAR(status.range_offset_std, std::sqrt(2e-4), 1e-12);
+  EXPECT_NEAR(status.sweep_duration, 0.003, 1e-12);
+  EXPECT_NEAR(status.sweep_duration_std, std::sqrt(5e-5), 1e-12);
   EXPECT_EQ(status.gyro_bias, 0.01);
   EXPECT_NEAR(status.gyro_bias_std, 0.002, 1e-12);
   EXPECT_EQ(status.gyro_time, 0.1);

@@ -215,16 +215,18 @@ TEST_F(HealthTest, TheErrorsOfTheWheelsAreToldWhereTheyAreEstimated) {
   EXPECT_EQ(value("error of the wheels: laser ahead [m]"), "0.0700 +- 0.0400");
 }
 
-TEST_F(HealthTest, TheOffsetOfRangesIsToldWhereItIsEstimated) {
-  const std::string key = "range offset on /scan [m]";
+TEST_F(HealthTest, ConstantsOfALaserAreToldWhereTheyAreEstimated) {
   verdictAt(100.5);
-  EXPECT_EQ(value(key), "missing");
+  EXPECT_EQ(value("range offset on /scan [m]"), "missing");
+  EXPECT_EQ(value("sweep duration on /scan [s]"), "missing");
   ScanReport report = scan(ScanOutcome::kUpdated, 100.5);
-  report.range_offset = RangeOffset(0.02);
-  report.range_offset.add({0.01, 30.0 / 4e-4, 0.0}, 0.0);
+  report.laser_constants = {LaserConstant(0.02), LaserConstant(0.01)};
+  report.laser_constants.range_offset.add({0.01, 30.0 / 4e-4, 0.0}, 0.0);
+  report.laser_constants.sweep_duration.add({0.006, 30.0 / 1e-4, 0.0}, 0.0);
   health_.scanTaken(report);
   verdictAt(100.6);
-  EXPECT_EQ(value(key), "0.0050 +- 0.0141");
+  EXPECT_EQ(value("range offset on /scan [m]"), "0.0050 +- 0.0141");
+  EXPECT_EQ(value("sweep duration on /scan [s]"), "0.0030 +- 0.0071");
 }
 
 TEST_F(HealthTest, AnImuThatIsSilentIsAWarningAndNoMore) {

@@ -20,10 +20,11 @@ struct DeskewingOptions {
 struct DeskewingPoint {
   double yaw_rate = 0.0;  ///< [rad/s] the largest of the drive
   RunErrors with;
-  RunErrors without;
+  RunErrors estimated;  ///< without, the duration of the sweep estimated
+  RunErrors without;    ///< scans as they are
 };
 
-/// A drive for each yaw rate; the scans are the same with and without.
+/// A drive for each yaw rate; the scans are the same each time.
 std::vector<DeskewingPoint> simulateDeskewing(const DeskewingOptions& options, const std::vector<double>& yaw_rates,
                                               const std::function<void()>& tick);
 

@@ -15,18 +15,19 @@ struct EstimationOptions {
   double matching_inflation = 3.0;  ///< of what residuals show beyond range noise: they do not show all of it
 };
 
-/// What a match tells of an error that all ranges of the laser have in common: it bends a wall that is seen beside the
-/// robot and ahead of it, the same wall otherwise from each place.
-struct RangeOffsetEvidence {
-  double value = 0.0;        ///< to be added to each range of both scans, that they fall together best [m]
-  double information = 0.0;  ///< inverse variance as far as range noise goes [1/m²]; 0: it tells nothing
-  double bias_std = 0.0;     ///< how far off such values are in the mean of many, which grows with the noise [m]
+/// What a match tells of a constant of the laser that bends what both scans see, the same wall otherwise from each
+/// place.
+struct ConstantEvidence {
+  double value = 0.0;        ///< by how much more of it allowed for the scans would fall together best
+  double information = 0.0;  ///< inverse variance as far as range noise goes; 0: it tells nothing
+  double bias_std = 0.0;     ///< how far off such values are in the mean of many
 };
 
 struct DisplacementEstimate {
   Displacement displacement;
-  RangeOffsetEvidence range_offset;
-  double residual_rms = 0.0;  ///< of the weighted residuals: 1 where the noise explains them
+  ConstantEvidence range_offset;    ///< to be added to each range of both scans [m]
+  ConstantEvidence sweep_duration;  ///< EvenSweep::duration of both [s]
+  double residual_rms = 0.0;        ///< of the weighted residuals: 1 where the noise explains them
 };
 
 /// The displacement that solves the problem with its pairs and weights as they are, starting from where the pairs were

@@ -23,6 +23,7 @@ struct ScanOptions {
   double range_noise_min = 0.01;  ///< [m] std of a range: no scan is believed to be better than this …
   double range_noise_max = 0.10;  ///< [m] … nor worse than this; in between, the scan itself tells
   double range_offset = 0.0;      ///< [m] added to each reading
+  EvenSweep sweep;                ///< undone, if motion is not told beam by beam
   int min_points = 20;            ///< a scan with fewer readings is not usable
   int max_beams = 2048;           ///< of a scan with more, every second beam is used, or every third, …
   SurfaceOptions surface;
@@ -35,6 +36,7 @@ struct PreparedScan {
   double angle_increment = 0.0;            ///< between neighbouring beams [rad]
   double range_noise = 0.0;                ///< std of one range, estimated from this scan [m]
   double range_offset = 0.0;               ///< that has been added to each range [m]
+  EvenSweep sweep;                         ///< that has been undone
   ScannedPoints points;                    ///< the readings
   std::vector<Surface> surface;            ///< the surface around each point
   PointTree tree;                          ///< the same points, for nearest neighbours
@@ -44,6 +46,9 @@ struct PreparedScan {
 
   std::size_t size() const { return points.size(); }
   Eigen::VectorXd rangeVariances() const;  ///< M: the diagonal of R [m²]
+
+  /// Derivative of point i by the duration of the sweep [m/s].
+  Eigen::Vector2d bySweepDuration(std::size_t i) const;
 };
 
 /// base_from_laser may point anywhere: ahead, rotated, upside down. If the scan cannot be used: null, and in rejection,

@@ -48,11 +48,12 @@ std::string toString(MatchFailure failure);
 struct Match {
   std::optional<Displacement> displacement;  ///< empty if and only if failure is not kNone
   MatchFailure failure = MatchFailure::kNone;
-  std::vector<Pair> pairs;  ///< at the aligned pose
-  double overlap = 0.0;     ///< share of the points of the current scan that have a partner, 0 to 1
-  double agreement = 0.0;   ///< AlignmentProblem::agreement(), 0 to 1
-  RangeOffsetEvidence range_offset;
-  double residual_rms = 0.0;  ///< of the weighted residuals: 1 where the noise explains them
+  std::vector<Pair> pairs;          ///< at the aligned pose
+  double overlap = 0.0;             ///< share of the points of the current scan that have a partner, 0 to 1
+  double agreement = 0.0;           ///< AlignmentProblem::agreement(), 0 to 1
+  ConstantEvidence range_offset;    ///< DisplacementEstimate::range_offset
+  ConstantEvidence sweep_duration;  ///< DisplacementEstimate::sweep_duration
+  double residual_rms = 0.0;        ///< of the weighted residuals: 1 where the noise explains them
 };
 
 class ScanMatcher {

@@ -1,6 +1,7 @@
 // How the robot moves while a scan is taken.
 #pragma once
 
+#include <Eigen/Core>
 #include <vector>
 
 #include "sckf_odometry/core/se2.h"
@@ -29,6 +30,17 @@ class ScanMotion {
     SE2 begin_from_end;
   };
   std::vector<Part> parts_;
+};
+
+/// A scan of which nobody tells when its beams were measured: one after the other, it is taken, evenly about the stamp,
+/// by a robot that moves evenly.
+struct EvenSweep {
+  Eigen::Vector3d twist = Eigen::Vector3d::Zero();  ///< of base_link: (vx, vy, yaw rate) [m/s, m/s, rad/s]
+  double duration = 0.0;                            ///< from the first beam to the last [s]; below 0: the last is first
+
+  /// base_link when a beam was measured, seen from base_link at the stamp. share: of the beam, -1/2 the first, 1/2 the
+  /// last.
+  SE2 at(double share) const { return SE2(share * duration * twist); }
 };
 
 }  // namespace sckf

@@ -13,10 +13,10 @@
 #include "sckf_odometry/matching/scan_matcher.h"
 #include "sckf_odometry/pipeline/imu_buffer.h"
 #include "sckf_odometry/pipeline/landmarks.h"
+#include "sckf_odometry/pipeline/laser_constants.h"
 #include "sckf_odometry/pipeline/odometry_buffer.h"
 #include "sckf_odometry/pipeline/other_sensors.h"
 #include "sckf_odometry/pipeline/pose_updates.h"
-#include "sckf_odometry/pipeline/range_offset.h"
 #include "sckf_odometry/pipeline/reference_policy.h"
 #include "sckf_odometry/pipeline/reference_scans.h"
 #include "sckf_odometry/pipeline/scan_report.h"
@@ -46,7 +46,8 @@ struct PipelineOptions {
   PoseUpdateOptions pose_updates;
   bool prefer_twist_covariance = false;  ///< use the twist covariance of the odometry message where it is sensible
   ScanOptions scan;
-  double range_offset_std = 0.015;  ///< [m] how wrong all ranges of a laser may be together: estimated; 0: not at all
+  double range_offset_std = 0.015;   ///< [m] how wrong all ranges of a laser may be together: estimated; 0: not at all
+  double sweep_duration_std = 0.01;  ///< [s] how long a laser may take for a scan: estimated; 0: motion meanwhile stays
   bool deskew = false;  ///< undo the motion while a scan is taken; it waits for odometry at its last beam then
   MatcherOptions matcher;
   ReferenceOptions reference;
@@ -138,6 +139,7 @@ class ScanOdometry {
   double gate(const Displacement& displacement) const;  ///< a larger innovation, normalised and squared, contradicts
   bool looksLikeSlip(const Match& match) const;
   ScanMotion motionDuring(const WaitingScans::Entry& waiting) const;
+  EvenSweep evenSweep(const WaitingScans::Entry& waiting) const;
   void propagateTo(Stamp stamp);
   void leaveTrail();
   void useHeading(ScanReport& report);
@@ -165,7 +167,7 @@ class ScanOdometry {
   ScanMatcher matcher_;
   struct Laser {
     ReferencePolicy policy;
-    RangeOffset range_offset;
+    LaserConstants constants;
     SweepCheck sweeps;
     std::optional<Stamp> taken;  ///< of the last scan of this estimate
     int failures = 0;            ///< so many scans, the last among them, were placed by no reference
@@ -187,6 +189,7 @@ class ScanOdometry {
   std::unique_ptr<FusionMethod> filter_;  // at filter_stamp_; null before the first odometry
   MapFilter* map_ = nullptr;              // filter_, where absolute poses are used
   Stamp filter_stamp_{0};
+  TwistWindow filter_twist_;  // up to filter_stamp_, of steps in the order of their stamps
   bool wheels_known_ = true;  // since the last scan
   double gyro_time_ = 0.0;    // [s] measured by a gyro, since then
   Standstill standstill_;     // up to filter_stamp_

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "sckf_odometry/matching/scan_matcher.h"
+#include "sckf_odometry/pipeline/laser_constants.h"
 #include "sckf_odometry/pipeline/pose_updates.h"
-#include "sckf_odometry/pipeline/range_offset.h"
 #include "sckf_odometry/pipeline/sweep.h"
 #include "sckf_odometry/pipeline/twist_window.h"
 
@@ -72,7 +72,7 @@ struct ScanReport {
   bool wheels_known = true;                  ///< false: wheels did not tell all of the motion since the scan before
   WheelCalibration calibration;              ///< then; its covariance is zero if it is not estimated
   GyroBias gyro_bias;                        ///< then; its variance is zero if it is not estimated
-  RangeOffset range_offset{0.0};             ///< of its laser, after the scan
+  LaserConstants laser_constants;            ///< of its laser, after the scan; variance zero: not estimated
   double gyro_time = 0.0;                    ///< [s] since the estimate before, that the gyro has measured
   HeadingUse heading = HeadingUse::kNone;    ///< of the IMU, at the scan's stamp
   bool stands = false;                       ///< the wheels have told of no motion for some time

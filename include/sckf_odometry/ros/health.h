@@ -76,7 +76,7 @@ class Health {
   struct Laser {
     std::string topic;
     MessageTally came;
-    RangeOffset range_offset{0.0};  // variance zero: not estimated
+    LaserConstants constants;  // variance zero: not estimated
   };
   std::vector<Laser> lasers_;
   std::size_t scans_in_pipeline_ = 0;
