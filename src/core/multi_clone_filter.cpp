@@ -1,7 +1,6 @@
 #include "sckf_odometry/core/multi_clone_filter.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -222,8 +221,7 @@ Innovation MultiCloneFilter::innovation(const Displacement& z) const {
   r.H_clone = z.observable * H_k;                                       // (18)
   r.H_pose = z.observable * H_x;
   // (17), projected on V_o, along the arc that a correction makes: where the wheels have slipped, it is long.
-  const auto& V = z.observable;
-  const Vector3d seen = V.transpose() * (V * V.transpose()).inverse() * (V * error(z.reference_from_current, z_hat));
+  const Vector3d seen = z.fromObservable() * (z.observable * error(z.reference_from_current, z_hat));
   const SE2 measured = compose(clones_[z.clone].pose, corrected(z_hat, seen));  // as predicted where nothing is seen
   r.residual = r.H_pose * additive(pose_) * logarithm(compose(measured, inverse(pose_)));
   r.noise = carriedOver(z.J_current, z.variance_current) + z.matching_noise;

@@ -1,5 +1,4 @@
 // How a scan corrects the estimate: by displacements from references, by landmarks, by a heading.
-#include <Eigen/LU>
 #include <algorithm>
 #include <sstream>
 
@@ -68,7 +67,7 @@ bool ScanOdometry::fuse(ScanReport& report) {
   const auto contradicts = [&] { return report.innovation->nis(slack) > bound; };
   const bool slipped = contradicts() && looksLikeSlip(report.match);
   if (slipped) {
-    distrustWheels();
+    allowForSlip();
     report.innovation = filter_->innovation(displacement);
     if (report.wheels_known) report.outcome = ScanOutcome::kSlip;
   }
@@ -93,10 +92,10 @@ void ScanOdometry::admitFailure(const ScanReport& report) {
   const bool others_tell = std::any_of(lasers_.begin(), lasers_.end(), [lately](const Laser& laser) {
     return laser.failures == 0 && laser.taken && *laser.taken > lately;
   });
-  if (!others_tell && options_.gate.trust_scans_on_slip) distrustWheels();
+  if (!others_tell && options_.gate.trust_scans_on_slip) allowForSlip();
 }
 
-void ScanOdometry::distrustWheels() {
+void ScanOdometry::allowForSlip() {
   const Eigen::Vector3d std(options_.gate.slip_std_translation, options_.gate.slip_std_translation,
                             options_.gate.slip_std_yaw);
   filter_->distrustWheels(std.cwiseAbs2().asDiagonal());
@@ -132,11 +131,7 @@ Match ScanOdometry::matchWithOlder(const PreparedScan& reference, const Prepared
                                    const DisplacementPrediction& prediction, bool placed) const {
   if (placed && isVague(prediction)) {
     Match match = matcher_.match(reference, scan, prediction);
-    if (match.displacement && match.displacement->dimension() == 3 &&
-        match.agreement >= options_.gate.doubtful_min_agreement &&
-        match.residual_rms <= options_.gate.slip_max_residual) {
-      return match;
-    }
+    if (match.displacement && matchesWell(match, options_.gate.doubtful_min_agreement)) return match;
   }
   return matcher_.matchNear(reference, scan, prediction);
 }
@@ -146,9 +141,7 @@ Match ScanOdometry::matchWithOlder(const PreparedScan& reference, const Prepared
 void ScanOdometry::allowForCommonErrors(const ScanReport& report) {
   if (!wasUsed(report.outcome) || !report.match.displacement) return;
   const Displacement& z = *report.match.displacement;
-  const Displacement::MatrixDD V_square = z.observable * z.observable.transpose();
-  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3> seen =
-      z.observable.transpose() * V_square.inverse();  // V_oᵀ · seen = I
+  Displacement::Matrix3D seen = z.fromObservable();
   seen.topRows<2>() = (z.reference_from_current.rotation().transpose() * seen.topRows<2>()).eval();
   filter_->loosen(options_.reference.matching_common * symmetric(seen * z.matching_noise * seen.transpose()));
 }
@@ -185,12 +178,14 @@ double ScanOdometry::gate(const Displacement& displacement) const {
 }
 
 bool ScanOdometry::looksLikeSlip(const Match& match) const {
-  const GateOptions& gate = options_.gate;
+  return options_.gate.trust_scans_on_slip && matchesWell(match, options_.gate.slip_min_agreement);
+}
+
+bool ScanOdometry::matchesWell(const Match& match, double min_agreement) const {
   const Eigen::Index seen = match.displacement->dimension();
   // One wall lies on any other, however the robot is turned.
-  const bool placed = seen == 3 || (seen == 2 && match.overlap >= gate.slip_min_overlap);
-  return gate.trust_scans_on_slip && placed && match.agreement >= gate.slip_min_agreement &&
-         match.residual_rms <= gate.slip_max_residual;
+  const bool placed = seen == 3 || (seen == 2 && match.overlap >= options_.gate.slip_min_overlap);
+  return placed && match.agreement >= min_agreement && match.residual_rms <= options_.gate.slip_max_residual;
 }
 
 void ScanOdometry::useHeading(ScanReport& report) {

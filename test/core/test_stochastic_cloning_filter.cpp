@@ -211,6 +211,15 @@ TEST(WithoutCorrelations, KeepsNoCorrelation) {
 
 // ---- Predicted displacement -----------------------------------------------------------------------------------------
 
+TEST(Displacement, OfWhatIsSeenHasNothingOfWhatIsNot) {
+  Displacement z;
+  z.observable.resize(2, 3);
+  z.observable << 0.6, 0.8, 0.0, 0.1, -0.2, 3.0;  // neither of length one nor at right angles
+  const Eigen::Vector3d unseen = z.observable.row(0).transpose().cross(z.observable.row(1).transpose());
+  EXPECT_TRUE(matricesNear(z.observable * z.fromObservable(), Eigen::Matrix2d::Identity(), 1e-14));
+  EXPECT_TRUE(matricesNear(unseen.transpose() * z.fromObservable(), Eigen::RowVector2d::Zero(), 1e-14));
+}
+
 TEST(PredictedDisplacement, HasTheCovarianceOfItsErrors) {
   // Robots with errors drawn from the filter's own noise; the share of the start cancels, that of the way is left.
   RandomInputs random(41);

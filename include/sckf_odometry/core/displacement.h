@@ -13,6 +13,7 @@ namespace sckf {
 /// with independent range noises z̃ and matching noise n. d is the number of directions that the scans see (0 to 3).
 struct Displacement {
   using MatrixD3 = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 3, 3>;
+  using Matrix3D = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3>;
   using MatrixDD = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>;
 
   std::size_t clone = 0;                              ///< which clone is the reference: 0 the newest
@@ -25,6 +26,9 @@ struct Displacement {
   MatrixDD matching_noise = Eigen::Matrix3d::Zero();  ///< R_n, d × d: what is not range noise
 
   Eigen::Index dimension() const { return observable.rows(); }
+
+  /// What is seen as a displacement, 3 × d: V_oᵀ · this = I, and nothing of it is in directions that are not seen.
+  Matrix3D fromObservable() const;
 
   /// R_{k/k+m} = J^k R_k J^kᵀ + J^{k+m} R_{k+m} J^{k+m}ᵀ + R_n, d × d.
   MatrixDD covariance() const;

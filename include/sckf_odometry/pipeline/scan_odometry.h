@@ -34,7 +34,8 @@ struct GateOptions {
   double slip_min_agreement = 0.7;    ///< scans match well if they agree by at least so much …
   double slip_max_residual = 3.0;     ///< … the weighted residuals are at most this …
   double slip_min_overlap = 0.6;  ///< … and where they see two directions only, this share of the points has a partner
-  double doubtful_min_agreement = 0.85;  ///< … by which scans agree with a reference that nothing placed, or far away
+  double doubtful_min_agreement = 0.85;  ///< agreement that a reference needs which could not be placed itself, and an
+                                         ///< older one that is found far from the prediction
 };
 
 struct PipelineOptions {
@@ -126,7 +127,7 @@ class ScanOdometry {
   std::shared_ptr<const PreparedScan> prepared(const WaitingScans::Entry& waiting, std::string& rejection) const;
   void compareWithReference(std::size_t clone, ScanReport& report);
   bool fuse(ScanReport& report);
-  void distrustWheels();
+  void allowForSlip();
   void admitFailure(const ScanReport& report);
   void compareWithOlderReferences(ScanReport& report);
   Match matchWithOlder(const PreparedScan& reference, const PreparedScan& scan,
@@ -138,6 +139,7 @@ class ScanOdometry {
   void useLandmarks(ScanReport& report);
   double gate(const Displacement& displacement) const;  ///< a larger innovation, normalised and squared, contradicts
   bool looksLikeSlip(const Match& match) const;
+  bool matchesWell(const Match& match, double min_agreement) const;
   ScanMotion motionDuring(const WaitingScans::Entry& waiting) const;
   EvenSweep evenSweep(const WaitingScans::Entry& waiting) const;
   void propagateTo(Stamp stamp);
