@@ -158,8 +158,10 @@ std::shared_ptr<const PreparedScan> prepareScan(const LaserScan& scan, const Eig
   if (!motion.atRest()) {
     undo([&](int beam) { return motion.at(beam * scan.time_increment); }, prepared->points);
   } else if (prepared->beams > 1) {
-    prepared->sweep = options.sweep;
-    undo([&](int beam) { return options.sweep.at(shareOf(beam, prepared->beams)); }, prepared->points);
+    const EvenSweep& sweep = options.sweep;
+    prepared->sweep = sweep;
+    const bool moves = sweep.duration != 0.0 && !sweep.twist.isZero(0.0);
+    if (moves) undo([&](int beam) { return sweep.at(shareOf(beam, prepared->beams)); }, prepared->points);
   }
   if (prepared->size() < static_cast<std::size_t>(options.min_points)) {
     std::ostringstream reason;
