@@ -15,6 +15,10 @@ struct Points {
 
   std::size_t kdtree_get_point_count() const { return points.size(); }
   double kdtree_get_pt(std::size_t i, std::size_t axis) const { return points[i](static_cast<Eigen::Index>(axis)); }
+  /// The square of it: nanoflann before 1.3, as MRPT of Debian 11 has it within, asks for that, too.
+  double kdtree_distance(const double* from, std::size_t i, std::size_t /*dimensions*/) const {
+    return (points[i] - Eigen::Vector2d(from[0], from[1])).squaredNorm();
+  }
   template <class Box>
   bool kdtree_get_bbox(Box& /*box*/) const {
     return false;

@@ -49,6 +49,14 @@ Eigen::Vector3d logarithm(const SE2& d) {
   return xi;
 }
 
+/// The rows and columns of those indices.
+MatrixXd partOf(const MatrixXd& matrix, const std::vector<Eigen::Index>& indices) {
+  const auto n = static_cast<Eigen::Index>(indices.size());
+  return MatrixXd::NullaryExpr(n, n, [&](Eigen::Index row, Eigen::Index column) {
+    return matrix(indices[static_cast<std::size_t>(row)], indices[static_cast<std::size_t>(column)]);
+  });
+}
+
 /// One covariance matrix of all ξ and of all range noise, and nothing folded, skipped or shared:
 ///   [ ξ (pose);  ξ of each clone, the newest first;  z̃ of each clone;  z̃ of the present scan ]
 class DenseMultiCloneFilter {
@@ -114,7 +122,7 @@ class DenseMultiCloneFilter {
     for (Index i = 0; i < 3 * static_cast<Index>(poses_.size()); ++i) from.push_back(i);
     for (Index i = n - M; i < n; ++i) from.push_back(i);
     for (Index i = 3 * static_cast<Index>(poses_.size()); i < n - M; ++i) from.push_back(i);
-    P_ = P_(from, from).eval();
+    P_ = partOf(P_, from);
     poses_.insert(poses_.begin(), poses_.front());
     sizes_.insert(sizes_.begin(), M);
     sizes_.pop_back();
@@ -128,7 +136,7 @@ class DenseMultiCloneFilter {
       const bool is_range = i >= firstRange(clone) && i < firstRange(clone) + sizes_[clone];
       if (!is_pose && !is_range) kept.push_back(i);
     }
-    P_ = P_(kept, kept).eval();
+    P_ = partOf(P_, kept);
     poses_.erase(poses_.begin() + static_cast<std::ptrdiff_t>(clone) + 1);
     sizes_.erase(sizes_.begin() + static_cast<std::ptrdiff_t>(clone));
   }

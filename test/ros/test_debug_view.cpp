@@ -68,7 +68,7 @@ ScanReport withDisplacement(const Displacement& displacement) {
   return report;
 }
 
-const Marker& find(const MarkerArray& array, const std::string& name_space, int id = 0) {
+Marker find(const MarkerArray& array, const std::string& name_space, int id = 0) {
   const auto is_it = [&](const Marker& marker) { return marker.ns == name_space && marker.id == id; };
   const auto it = std::find_if(array.markers.begin(), array.markers.end(), is_it);
   if (it == array.markers.end()) throw std::out_of_range(name_space);
@@ -252,10 +252,10 @@ TEST(DebugMarkers, OfARealMatchThePairsAreShortAndTheEllipseIsAboutTheRobot) {
   const auto [report, reference] = lastOf(test::SimulatedDrive());
   ASSERT_EQ(report.reference_stamp, reference.scan->stamp);
   const MarkerArray array = debugMarkers(report, reference, "odom");
-  const Marker& pairs = find(array, "pairs");
+  const Marker pairs = find(array, "pairs");
   ASSERT_GT(pairs.points.size(), 400u);
   for (std::size_t i = 0; i < pairs.points.size(); i += 2) EXPECT_LT((at(pairs, i) - at(pairs, i + 1)).norm(), 0.25);
-  const Marker& ellipse = find(array, "covariance");
+  const Marker ellipse = find(array, "covariance");
   const Eigen::Vector2d centre = 0.5 * (at(ellipse, 0) + at(ellipse, ellipse.points.size() / 2));
   EXPECT_LT((centre - report.estimate->odom_from_base.translation()).norm(), 0.02);
   EXPECT_EQ(find(array, "unobservable").action, Marker::DELETE);
@@ -266,12 +266,12 @@ TEST(DebugMarkers, InACorridorTheArrowPointsAlongItAndTheEllipseIsLong) {
   const auto [report, reference] = lastOf(test::SimulatedDrive({}, 16000, test::corridor(), along));
   ASSERT_TRUE(report.match.displacement);
   const MarkerArray array = debugMarkers(report, reference, "odom");
-  const Marker& arrow = find(array, "unobservable");
+  const Marker arrow = find(array, "unobservable");
   const Eigen::Vector2d corridor(std::cos(-0.3), std::sin(-0.3));  // odom is where the robot started, turned by 0.3
   EXPECT_GT(corridor.dot(at(arrow, 1) - at(arrow, 0)), 0.999);
+  const Marker ellipse = find(array, "covariance");
   double longest = 0.0;
   for (std::size_t i = 0; i < 24; ++i) {
-    const Marker& ellipse = find(array, "covariance");
     longest = std::max(longest, (at(ellipse, i) - at(ellipse, i + 24)).dot(corridor));
     longest = std::max(longest, (at(ellipse, i + 24) - at(ellipse, i)).dot(corridor));
     EXPECT_LT(std::abs((at(ellipse, i) - at(ellipse, i + 24)).dot(quarterTurn(corridor))), 0.3);
