@@ -152,21 +152,20 @@ double AlignmentProblem::agreement() const {
 
 NormalEquations AlignmentProblem::normalEquations(const SE2& reference_from_current) const {
   const RigidMotion motion(reference_from_current);
-  Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();  // of w (A, e) (A, e)ᵀ
+  WeightedSquares squares;
   Eigen::Matrix3d spurious = Eigen::Matrix3d::Zero();
   double lever_square_sum = 0.0;
   for (const Residual& residual : residuals_) {
     const ResidualTerms t = terms(residual, motion);
     const double w = kernel_.weight(t.e);
-    const Eigen::Vector4d a(t.A.x(), t.A.y(), t.A.z(), t.e);
-    sum += w * a * a.transpose();
+    squares.add(w, t);
     lever_square_sum += t.lever.squaredNorm();
     if (residual.surface == nullptr) continue;
     const Eigen::Vector3d dA = derivativeByNormal(residual, t);
     spurious += w / residual.surface->spread * dA * dA.transpose();
   }
   const double weight = 1.0 / square(scale_);
-  return {weight * sum.topLeftCorner<3, 3>(), weight * sum.topRightCorner<3, 1>(),
+  return {weight * squares.information(), weight * squares.gradient(),
           weight * square(reference_.range_noise) * spurious,
           std::sqrt(lever_square_sum / static_cast<double>(residuals_.size()))};
 }

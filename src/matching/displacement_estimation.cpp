@@ -26,21 +26,16 @@ inline Eigen::Matrix3d hessianOf(const RobustKernel& kernel, const Residual& res
 
 /// Derivatives of the loss by the displacement, at one of a search.
 struct LossSlope {
-  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  WeightedSquares squares;  // its information: the hessian of the loss with its weights fixed
   Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  // Σ w A Aᵀ: the hessian of the loss with its weights fixed
 
   LossSlope(const AlignmentProblem& problem, const SE2& x) {
     const RigidMotion motion(x);
-    Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();  // of w (A, e) (A, e)ᵀ
     for (const Residual& residual : problem.residuals()) {
       const ResidualTerms t = problem.terms(residual, motion);
-      const Eigen::Vector4d a(t.A.x(), t.A.y(), t.A.z(), t.e);
-      sum += problem.kernel().weight(t.e) * a * a.transpose();
+      squares.add(problem.kernel().weight(t.e), t);
       hessian += hessianOf(problem.kernel(), residual, t);
     }
-    information = sum.topLeftCorner<3, 3>();
-    gradient = sum.topRightCorner<3, 1>();
   }
 };
 
@@ -55,9 +50,10 @@ SE2 minimise(const AlignmentProblem& problem, SE2 x, const ObservableDirections&
   for (int i = 0; i < kMaxIterations; ++i) {
     const LossSlope slope(problem, x);
     const MatrixDD hessian = B.transpose() * slope.hessian * B;
-    const MatrixDD information = B.transpose() * slope.information * B;
+    const MatrixDD information = B.transpose() * slope.squares.information() * B;
     const bool convex = Eigen::LLT<MatrixDD>(hessian - kConvex * information).info() == Eigen::Success;
-    const Eigen::VectorXd step = -(convex ? hessian : information).ldlt().solve(B.transpose() * slope.gradient);
+    const Eigen::VectorXd step =
+        -(convex ? hessian : information).ldlt().solve(B.transpose() * slope.squares.gradient());
     x = corrected(x, B * step);
     if (step.norm() < (convex ? kNewtonStep : kStep)) break;
   }
@@ -91,26 +87,25 @@ struct LossDerivatives {
       : by_reference(Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(problem.reference().beams))),
         by_current(Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(problem.current().beams))) {}
 
-  Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();      // ∂²L/∂x²
-  Eigen::Matrix3Xd by_reference;                          // ∂²L/∂x∂z_k, 3 × M_k
-  Eigen::Matrix3Xd by_current;                            // ∂²L/∂x∂z_{k+m}, 3 × M_{k+m}
-  std::vector<BeamBlock> blocks;                          // of which the hessian is the sum
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  // Σ w A Aᵀ
-  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();     // Σ w e A
+  Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();  // ∂²L/∂x²
+  Eigen::Matrix3Xd by_reference;                      // ∂²L/∂x∂z_k, 3 × M_k
+  Eigen::Matrix3Xd by_current;                        // ∂²L/∂x∂z_{k+m}, 3 × M_{k+m}
+  std::vector<BeamBlock> blocks;                      // of which the hessian is the sum
+  WeightedSquares squares;
+  double weight = 0.0;  // Σ w
   ByConstant by_range_offset;
   ByConstant by_sweep_duration;
-  double loss_weight = 0.0;
-  double loss_square = 0.0;
 
-  double excess() const { return std::max(1.0, loss_square / loss_weight); }  // of the residuals over their noise
+  double meanSquare() const { return squares.residuals() / weight; }  // of the residuals, in units of their noise
+  double excess() const { return std::max(1.0, meanSquare()); }
 
   /// Of the constant, the displacement eliminated. Nothing where a direction is not seen: the constant would make up
   /// for what the prediction is wrong by there.
   ConstantEvidence evidence(const ByConstant& constant, const ObservableDirections& seen) const {
     if (seen.dimension() < 3) return {};
-    const Eigen::Vector3d eliminated = information.ldlt().solve(constant.coupling);
+    const Eigen::Vector3d eliminated = squares.information().ldlt().solve(constant.coupling);
     const double left = constant.information - constant.coupling.dot(eliminated);
-    const double value = -(constant.gradient - eliminated.dot(gradient)) / left;
+    const double value = -(constant.gradient - eliminated.dot(squares.gradient())) / left;
     if (!(left > 0.0) || !std::isfinite(value)) return {};
     return {value, left, 0.0};
   }
@@ -163,8 +158,8 @@ inline void addDerivatives(const AlignmentProblem& problem, const Residual& resi
     by_offset += shift;
   }
   const double w = problem.kernel().weight(t.e);
-  out.information += w * t.A * t.A.transpose();
-  out.gradient += w * t.e * t.A;
+  out.squares.add(w, t);
+  out.weight += w;
   out.by_range_offset.add(w, residual, t, by_offset);
   const Eigen::Vector2d by_duration = x.C * problem.current().bySweepDuration(c) -
                                       problem.reference().bySweepDuration(static_cast<std::size_t>(residual.reference));
@@ -179,11 +174,7 @@ LossDerivatives differentiate(const AlignmentProblem& problem, const RigidMotion
     const int its_block = beam / options.correlated_beams;
     if (out.blocks.empty() || its_block != block) out.blocks.emplace_back();
     block = its_block;
-    const ResidualTerms t = problem.terms(residual, x);
-    addDerivatives(problem, residual, x, t, out);
-    const double w = problem.kernel().weight(t.e);
-    out.loss_weight += w;
-    out.loss_square += w * t.e * t.e;
+    addDerivatives(problem, residual, x, problem.terms(residual, x), out);
   }
   return out;
 }
@@ -230,7 +221,7 @@ ConstantEvidence rangeOffset(const AlignmentProblem& problem, const LossDerivati
   constexpr double kDerivativeNoise = 0.03;
   const ConstantEvidence told = loss.evidence(loss.by_range_offset, seen);
   const double noise = std::max(problem.reference().range_noise, problem.current().range_noise);
-  const double derivative = noise * std::sqrt(told.information / loss.loss_weight);  // rms, the displacement eliminated
+  const double derivative = noise * std::sqrt(told.information / loss.weight);  // rms, the displacement eliminated
   if (derivative < kDerivativeNoise) return {};
   return {told.value, told.information / loss.excess(), kBias * noise * noise};
 }
@@ -266,7 +257,7 @@ std::optional<DisplacementEstimate> estimateDisplacement(const AlignmentProblem&
                                    options.matching_inflation);
   estimate.range_offset = rangeOffset(problem, loss, seen);
   estimate.sweep_duration = sweepDuration(loss, seen);
-  estimate.residual_rms = std::sqrt(loss.loss_square / loss.loss_weight);
+  estimate.residual_rms = std::sqrt(loss.meanSquare());
   return estimate;
 }
 

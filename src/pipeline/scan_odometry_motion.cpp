@@ -30,10 +30,8 @@ ScanMotion ScanOdometry::motionDuring(const WaitingScans::Entry& waiting) const 
 EvenSweep ScanOdometry::evenSweep(const WaitingScans::Entry& waiting) const {
   if (waiting.sweep.deskewing == Deskewing::kDone) return {};
   const Twist twist = filter_twist_.twist();
-  const MotionLimits& limits = options_.motion;
-  const bool known = twist.covariance(0, 0) < Twist::kUnknownVariance &&
-                     twist.mean.head<2>().norm() <= limits.max_speed && std::abs(twist.mean.z()) <= limits.max_yaw_rate;
-  if (!known) return {};
+  const bool known = twist.covariance(0, 0) < Twist::kUnknownVariance;
+  if (!known || !isPossible(twist.mean, options_.motion)) return {};
   return {twist.mean, lasers_[waiting.laser].constants.sweep_duration.value()};
 }
 

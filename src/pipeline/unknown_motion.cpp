@@ -17,6 +17,10 @@ bool isPossible(const SE2& motion, double dt, const MotionLimits& limits) {
          std::abs(motion.yaw) <= limits.max_yaw_rate * dt + limits.slack_yaw;
 }
 
+bool isPossible(const Eigen::Vector3d& velocity, const MotionLimits& limits) {
+  return velocity.head<2>().norm() <= limits.max_speed && std::abs(velocity.z()) <= limits.max_yaw_rate;
+}
+
 OdometryIncrement guessedIncrement(const MotionGuess& guess, Stamp from, Stamp to, double memory,
                                    const MotionLimits& limits) {
   const double begin = seconds(from - guess.since);

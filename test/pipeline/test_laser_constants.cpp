@@ -57,17 +57,22 @@ TEST(LaserConstant, WithoutStdThereIsNoneAndAnotherStdBeginsAnew) {
   EXPECT_EQ(constant.value(), 0.0);
 }
 
-PipelineOptions estimating(double std) {
+using Std = double PipelineOptions::*;  // of a constant
+
+PipelineOptions estimating(Std constant, double std) {
   PipelineOptions options;
-  options.range_offset_std = std;
+  options.*constant = std;
   return options;
 }
+
+constexpr Std kRangeOffset = &PipelineOptions::range_offset_std;
+constexpr Std kSweepDuration = &PipelineOptions::sweep_duration_std;
 
 TEST(RangeOffset, IsFoundOnADrive) {
   for (const double error : {0.03, 0.0, -0.03}) {
     SimulatedDrive drive({}, 31000);
     drive.laser.offset = error;
-    Driven driven(drive, estimating(0.03));
+    Driven driven(drive, estimating(kRangeOffset, 0.03));
     driven.run(0, 30000);
     const LaserConstant& found = driven.reports.back().laser_constants.range_offset;
     EXPECT_NEAR(found.value(), -error, 3.0 * std::sqrt(found.variance())) << "of " << error;
@@ -78,7 +83,7 @@ TEST(RangeOffset, IsFoundOnADrive) {
 
 /// Of scans that are near each other nothing can be told but what noise makes up, and that always to the same side.
 TEST(RangeOffset, ScansOneAfterTheOtherDoNotLetItRunAway) {
-  PipelineOptions options = estimating(0.015);
+  PipelineOptions options = estimating(kRangeOffset, 0.015);
   options.method = "sckf";
   options.reference.kf_dist_linear = 0.0;
   SimulatedDrive drive({}, 121000, room(), [](double t) { return SE2(std::sin(0.1 * t), 0.0, 0.5 * std::sin(0.2 * t)); });
@@ -102,7 +107,7 @@ TEST(RangeOffset, ItsEstimateKeepsARobotInACorridorStraight) {
     drive.laser = frontLaser();
     drive.laser.noise = 0.005;
     drive.laser.offset = -0.03;
-    Driven driven(drive, estimating(std));
+    Driven driven(drive, estimating(kRangeOffset, std));
     driven.run(0, 60000);
     return std::abs(driven.latestError(60000).z());
   };
@@ -113,7 +118,7 @@ TEST(RangeOffset, ItsEstimateKeepsARobotInACorridorStraight) {
 }
 
 TEST(RangeOffset, EachLaserHasItsOwn) {
-  PipelineOptions options = estimating(0.03);
+  PipelineOptions options = estimating(kRangeOffset, 0.03);
   options.lasers = 2;
   SimulatedDrive front;
   front.laser.offset = 0.03;
@@ -131,12 +136,6 @@ TEST(RangeOffset, EachLaserHasItsOwn) {
   EXPECT_NEAR(found[1].value(), 0.03, 0.01);
 }
 
-PipelineOptions sweeping(double std) {
-  PipelineOptions options;
-  options.sweep_duration_std = std;
-  return options;
-}
-
 SimulatedDrive sweptDrive(double duration) {
   SimulatedDrive drive({}, 61000);
   drive.laser.time_increment = duration / (drive.laser.beams - 1);
@@ -146,7 +145,7 @@ SimulatedDrive sweptDrive(double duration) {
 TEST(SweepDuration, IsFoundOnADrive) {
   for (const double duration : {0.04, 0.0, -0.04}) {
     const SimulatedDrive drive = sweptDrive(duration);
-    Driven driven(drive, sweeping(0.03));
+    Driven driven(drive, estimating(kSweepDuration, 0.03));
     driven.run(0, 60000);
     const LaserConstant& found = driven.reports.back().laser_constants.sweep_duration;
     EXPECT_NEAR(found.value(), duration, 3.0 * std::sqrt(found.variance())) << "of " << duration;
@@ -159,7 +158,7 @@ TEST(SweepDuration, IsFoundOnADrive) {
 TEST(SweepDuration, ItsEstimateKeepsTheYaw) {
   const auto yawAfter = [](double std) {
     const SimulatedDrive drive = sweptDrive(0.04);
-    PipelineOptions options = sweeping(std);
+    PipelineOptions options = estimating(kSweepDuration, std);
     options.method = "sckf";
     options.reference.kf_dist_linear = 0.0;
     Driven driven(drive, options);
@@ -181,27 +180,27 @@ TEST(SweepDuration, NothingIsToldOfItWhereTheMotionIsUndoneOrCannotBe) {
     EXPECT_EQ(driven.reports.back().laser_constants.sweep_duration.value(), 0.0);
     EXPECT_NEAR(driven.reports.back().laser_constants.sweep_duration.variance(), 9e-4, 1e-18);
   };
-  PipelineOptions deskewing = sweeping(0.03);
+  PipelineOptions deskewing = estimating(kSweepDuration, 0.03);
   deskewing.deskew = true;
   expectNothing(deskewing, roundDrive);
-  PipelineOptions slow = sweeping(0.03);
+  PipelineOptions slow = estimating(kSweepDuration, 0.03);
   slow.motion.max_speed = 0.2;
   expectNothing(slow, [](double t) { return SE2(0.3 * t - 1.0, 0.0, 0.0); });
-  PipelineOptions straight = sweeping(0.03);
+  PipelineOptions straight = estimating(kSweepDuration, 0.03);
   straight.motion.max_yaw_rate = 0.2;
   expectNothing(straight, [](double t) { return SE2(0.0, 0.0, 0.3 * t); });
 }
 
 TEST(SweepDuration, BeginsAnewWithTheEstimateAndWithAnotherStd) {
   const SimulatedDrive drive = sweptDrive(0.04);
-  Driven driven(drive, sweeping(0.03));
+  Driven driven(drive, estimating(kSweepDuration, 0.03));
   driven.run(0, 5000);
   EXPECT_GT(driven.reports.back().laser_constants.sweep_duration.value(), 0.005);
   driven.pipeline.setPose(SE2(), Eigen::Matrix3d::Zero(), at(5000));
   driven.run(5020, 5120);
   EXPECT_EQ(driven.reports.back().laser_constants.sweep_duration.value(), 0.0);
   driven.run(5140, 10000);
-  driven.pipeline.setOptions(sweeping(0.0));
+  driven.pipeline.setOptions(estimating(kSweepDuration, 0.0));
   driven.run(10020, 10500);
   EXPECT_EQ(driven.reports.back().laser_constants.sweep_duration.variance(), 0.0);
   EXPECT_EQ(driven.reports.back().scan->sweep.duration, 0.0);

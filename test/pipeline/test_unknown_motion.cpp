@@ -25,6 +25,15 @@ TEST(MotionLimits, AreSpeedTimesTimeAndASlack) {
   EXPECT_TRUE(isPossible(SE2(0.09, 0, 0.19), 0.0, limits)) << "in no time the slack";
 }
 
+TEST(MotionLimits, OfAVelocityHaveNoSlack) {
+  MotionLimits limits;
+  limits.max_speed = 2.0;
+  limits.max_yaw_rate = 3.0;
+  EXPECT_TRUE(isPossible(Eigen::Vector3d(1.4, -1.4, -2.99), limits));
+  EXPECT_FALSE(isPossible(Eigen::Vector3d(1.5, -1.4, 0.0), limits));
+  EXPECT_FALSE(isPossible(Eigen::Vector3d(0.0, 0.0, -3.01), limits));
+}
+
 /// 1 m/s and 0.5 rad/s for 0.4 s: along an arc of 0.4 m and 0.2 rad, whose chord points ahead by half of it.
 TEST(MotionGuess, KeepsItsVelocityOnAnArc) {
   const MotionGuess guess{{1.0, 0.0, 0.5}, ms(100)};

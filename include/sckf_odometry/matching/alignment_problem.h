@@ -54,6 +54,21 @@ struct ResidualTerms {
   Eigen::Vector3d A;       ///< ∂e/∂(x, y, yaw)
 };
 
+/// Σ w (A, e) (A, e)ᵀ over residuals: all that least squares with weights need, in one sum because that is quicker.
+class WeightedSquares {
+ public:
+  void add(double weight, const ResidualTerms& t) {
+    const Eigen::Vector4d a(t.A.x(), t.A.y(), t.A.z(), t.e);
+    sum_ += weight * a * a.transpose();
+  }
+  Eigen::Matrix3d information() const { return sum_.topLeftCorner<3, 3>(); }  ///< Σ w A Aᵀ
+  Eigen::Vector3d gradient() const { return sum_.topRightCorner<3, 1>(); }    ///< Σ w e A
+  double residuals() const { return sum_(3, 3); }                             ///< Σ w e²
+
+ private:
+  Eigen::Matrix4d sum_ = Eigen::Matrix4d::Zero();
+};
+
 /// The problem linearised at a displacement, its robust weights divided by the square of its scale.
 struct NormalEquations {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< Σ Aᵀ w A

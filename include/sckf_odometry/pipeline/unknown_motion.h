@@ -18,6 +18,8 @@ struct MotionLimits {
 
 /// Whether wheels can have made a motion in dt [s].
 bool isPossible(const SE2& motion, double dt, const MotionLimits& limits);
+/// Whether a robot can have a velocity (vx, vy, yaw rate) [m/s, m/s, rad/s].
+bool isPossible(const Eigen::Vector3d& velocity, const MotionLimits& limits);
 
 /// A robot that nothing has measured since an instant, and the velocity that it had then.
 struct MotionGuess {
