@@ -35,12 +35,12 @@ FIGURES = ("four_methods", "four_methods_covariance", "line_matching", "line_mat
            "extensions_update_cost")
 
 
-def experiment(arguments: List[str], **options: object) -> subprocess.CompletedProcess:
-    environment = {key: value for key, value in os.environ.items() if key != "DISPLAY"}
+def experiment(arguments: List[str], **environment: str) -> subprocess.CompletedProcess:
+    environment = {key: value for key, value in {**os.environ, **environment}.items() if key != "DISPLAY"}
     folder = os.environ.get("SCKF_BIN_DIR")
     return subprocess.run([str(SCRIPTS / "experiment"), *arguments, *(["--bin-dir", folder] if folder else [])],
                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True, check=False,
-                          env=environment, **options)
+                          env=environment)
 
 
 class AllExperiments(unittest.TestCase):
@@ -254,6 +254,13 @@ class CommandLine(unittest.TestCase):
                 table = np.genfromtxt(Path(folder) / "one_dimension_simulated.csv", delimiter=",", names=True)
                 variances.append(table["with_c"])
         np.testing.assert_allclose(variances[1], 4.0 * variances[0], rtol=1e-6)
+
+    def test_without_git_the_report_has_the_version_of_the_package_alone(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            done = experiment(["one_dimension", "--output", folder, "--runs", "2"], PATH=folder)
+            self.assertEqual(done.returncode, 0, done.stdout)
+            report = (Path(folder) / "report.md").read_text(encoding="utf-8")
+        self.assertRegex(report, r"Versions: sckf_odometry \d+\.\d+\.\d+; ")
 
     def test_says_where_it_looked_for_a_program(self) -> None:
         with self.assertRaisesRegex(ProgramError, "/no/such/folder.*--bin-dir"):
