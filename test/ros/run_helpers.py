@@ -89,6 +89,7 @@ class Recorder:
         rospy.Subscriber('/diagnostics', DiagnosticArray, self._record_diagnostics, queue_size=None)
 
     def wait_for_connection(self):
+        """Else the first messages of the node may be lost, on a busy machine."""
         wait_until(lambda: all(s.get_num_connections() > 0 for s in self._subscribers), 'the topics of the node')
 
     def _record(self, message, topic):

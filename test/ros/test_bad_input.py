@@ -137,6 +137,7 @@ class BadInput(unittest.TestCase):
             MANAGER, '/sckf_odometry', kf_dist_linaer=0.3, kf_dist_linear=1, max_scan_delay=10000,
             prefer_twist_covariance=True, fixed_frame='odom', base_link_frame='unknown', base_frame='base_link'))
         helpers.wait_for_subscriber('/scan')
+        cls.recorder.wait_for_connection()
         good = simulated_bag.messages(duration=40.0)
         messages, cls.kinds, cls.kind_at = with_bad_messages(good)
         cls.scans = [message.header.stamp.to_sec() for topic, message, _ in good if topic == '/scan']

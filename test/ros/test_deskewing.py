@@ -47,8 +47,9 @@ class Deskewing(unittest.TestCase):
                 own = scan_of(node, message, cls.scans) if topic == '/scan' else message
                 messages.append(('/%s%s' % (node, topic), own, stamp))
             cls.scans += topic == '/scan'
-        for node in NODES:
+        for node, recorder in cls.recorders.items():
             helpers.wait_for_subscriber('/%s/scan' % node)
+            recorder.wait_for_connection()
         helpers.Feeder(sorted({topic for topic, _, _ in messages})).feed(messages)
         for node, recorder in cls.recorders.items():
             helpers.wait_until(lambda recorder=recorder: len(recorder.messages('pose')) >= cls.scans, 'poses of ' + node)

@@ -83,6 +83,7 @@ class Example(unittest.TestCase):
         cls.recorder = helpers.Recorder()
         cls.downstream = Downstream(cls.robot.odom_frame, cls.robot.base_frame, cls.robot.queue, cls.robot.map)
         helpers.wait_for_subscriber('/scan')
+        cls.recorder.wait_for_connection()
         helpers.Feeder(sorted({topic for topic, _, _ in messages})).feed(messages, SPEED)
         helpers.wait_until(lambda: cls.recorder.newest_stamp('odometry/filtered') >= cls.wheels[-1] - 1e-6,
                            'the last odometry')

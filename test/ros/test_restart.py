@@ -17,6 +17,7 @@ class Restart(unittest.TestCase):
     def setUpClass(cls):
         cls.recorder = helpers.Recorder()
         helpers.wait_for_subscriber('/scan')
+        cls.recorder.wait_for_connection()
         messages = simulated_bag.messages(duration=20.0)
         feeder = helpers.Feeder(['/odom', '/scan', '/tf_static'])
         last = [stamp for topic, _, stamp in messages if topic == '/odom'][-1]
