@@ -210,6 +210,12 @@ class Feeder:
             time.sleep(max(0.0, begin + (stamp - first) / speed - time.time()))
             self._publishers[topic].publish(message)
 
+    def close(self):
+        """Before another feeder for a node that is started again: rospy of Debian 11 counts those who have gone as
+        connected until it has something to send."""
+        for publisher in self._publishers.values():
+            publisher.unregister()
+
 
 def data_file(name):
     """A recorded log, None where the folder that the environment variable SCKF_DATA names does not have it."""

@@ -155,6 +155,7 @@ class Services(unittest.TestCase):
         with open(cls.state_file) as file:
             cls.state = yaml.safe_load(file)
         cls.last_before_restart = cls.recorder.messages('odometry/filtered')[-1]
+        cls.feeder.close()
         cls.loader = cls.load()
         cls.feeder = helpers.Feeder(['/odom', '/scan', '/tf_static'])
         cls.feeder.feed([entry for entry in cls.messages if entry[0] == '/tf_static'])
