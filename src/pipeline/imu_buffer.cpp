@@ -6,6 +6,7 @@
 
 #include "sckf_odometry/core/se2.h"
 #include "sckf_odometry/pipeline/odometry_buffer.h"
+#include "sckf_odometry/pipeline/stamped.h"
 
 namespace sckf {
 
@@ -14,16 +15,10 @@ namespace {
 /// Readings that wait for odometry, without which none is ever used.
 constexpr std::size_t kMostSamples = 20000;
 
-bool earlier(const ImuSample& sample, Stamp stamp) { return sample.stamp < stamp; }
-
 /// Faster than any gyro measures [rad/s], and more than any yaw is [rad].
 constexpr double kLargest = 1e3;
 
 bool isSensible(const std::optional<double>& value) { return !value || std::abs(*value) <= kLargest; }
-
-double share(const ImuSample& before, const ImuSample& after, Stamp stamp) {
-  return seconds(stamp - before.stamp) / seconds(after.stamp - before.stamp);
-}
 
 double rateAt(const ImuSample& before, const ImuSample& after, Stamp stamp) {
   return *before.yaw_rate + share(before, after, stamp) * (*after.yaw_rate - *before.yaw_rate);
@@ -34,7 +29,7 @@ double rateAt(const ImuSample& before, const ImuSample& after, Stamp stamp) {
 ImuBuffer::Insertion ImuBuffer::insert(const ImuSample& sample) {
   if (!isSensible(sample.yaw_rate) || !isSensible(sample.yaw) || !isTime(sample.stamp)) return Insertion::kNotFinite;
   if (discarded_ && sample.stamp < *discarded_) return Insertion::kTooOld;
-  const auto after = std::lower_bound(samples_.begin(), samples_.end(), sample.stamp, earlier);
+  const auto after = firstFrom(samples_, sample.stamp);
   if (after != samples_.end() && after->stamp == sample.stamp) return Insertion::kDuplicate;
   samples_.insert(after, sample);
   if (samples_.size() > kMostSamples) samples_.pop_front();
@@ -46,7 +41,7 @@ bool ImuBuffer::isGap(const ImuSample& before, const ImuSample& after) const {
 }
 
 ImuBuffer::Samples::const_iterator ImuBuffer::bracket(Stamp stamp) const {
-  const auto after = std::lower_bound(samples_.begin(), samples_.end(), stamp, earlier);
+  const auto after = firstFrom(samples_, stamp);
   if (after == samples_.end() || after->stamp == stamp) return after;
   const bool told = after != samples_.begin() && !isGap(*std::prev(after), *after);
   return told ? after : samples_.end();

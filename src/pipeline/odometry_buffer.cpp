@@ -4,12 +4,11 @@
 #include <cassert>
 #include <cmath>
 
+#include "sckf_odometry/pipeline/stamped.h"
+
 namespace sckf {
 
 namespace {
-
-bool earlier(const OdometrySample& sample, Stamp stamp) { return sample.stamp < stamp; }
-bool later(Stamp stamp, const OdometrySample& sample) { return stamp < sample.stamp; }
 
 /// A driver that begins anew says that the robot is at the origin of its frame.
 bool isAtOrigin(const SE2& pose) {
@@ -49,7 +48,7 @@ bool OdometryBuffer::isAhead(const OdometrySample& sample) const {
 }
 
 OdometryBuffer::Insertion OdometryBuffer::place(const OdometrySample& sample, const MotionGuess& guess) {
-  const auto after = std::lower_bound(samples_.begin(), samples_.end(), sample.stamp, earlier);
+  const auto after = firstFrom(samples_, sample.stamp);
   if (after != samples_.end() && after->stamp == sample.stamp) return Insertion::kDuplicate;
   const auto entry = samples_.insert(after, Entry{sample, std::nullopt, false});
   judge(entry, guess);
@@ -92,20 +91,16 @@ void OdometryBuffer::bridge(Stamp stamp, const MotionGuess& guess) {
 
 OdometryBuffer::Entry OdometryBuffer::at(Stamp stamp) const {
   assert(covers(stamp));
-  const auto after = std::lower_bound(samples_.begin(), samples_.end(), stamp, earlier);
+  const auto after = firstFrom(samples_, stamp);
   if (after->stamp == stamp) return *after;
   const auto before = std::prev(after);
-  const double share = seconds(stamp - before->stamp) / seconds(after->stamp - before->stamp);
-  const Eigen::Vector3d motion = between(before->odom_from_base, after->odom_from_base).vector();
   Entry entry = *after;  // twist covariance and guess hold for the interval that ends at their sample
   entry.stamp = stamp;
-  entry.odom_from_base = compose(before->odom_from_base, SE2(share * motion));
+  entry.odom_from_base = poseBetween(*before, *after, stamp);
   return entry;
 }
 
-Stamp OdometryBuffer::lastUpTo(Stamp stamp) const {
-  return std::prev(std::upper_bound(samples_.begin(), samples_.end(), stamp, later))->stamp;
-}
+Stamp OdometryBuffer::lastUpTo(Stamp stamp) const { return std::prev(firstAfter(samples_, stamp))->stamp; }
 
 std::vector<OdometryBuffer::Step> OdometryBuffer::steps(Stamp from, Stamp to) const {
   std::vector<Step> steps;
@@ -115,8 +110,7 @@ std::vector<OdometryBuffer::Step> OdometryBuffer::steps(Stamp from, Stamp to) co
     steps.push_back({last, next, next.guess});
     last = next;
   };
-  for (auto it = std::upper_bound(samples_.begin(), samples_.end(), from, later);
-       it != samples_.end() && it->stamp < to; ++it) {
+  for (auto it = firstAfter(samples_, from); it != samples_.end() && it->stamp < to; ++it) {
     append(*it);
   }
   append(at(to));

@@ -1,7 +1,8 @@
 #include "sckf_odometry/pipeline/pose_updates.h"
 
-#include <algorithm>
 #include <iterator>
+
+#include "sckf_odometry/pipeline/stamped.h"
 
 namespace sckf {
 
@@ -20,8 +21,7 @@ PoseReport notUsed(Stamp stamp, PoseOutcome outcome, const std::string& reason) 
 }
 
 std::optional<PoseUpdate> WaitingPoses::add(const PoseUpdate& pose) {
-  const auto later = [](Stamp stamp, const PoseUpdate& other) { return stamp < other.stamp; };
-  poses_.insert(std::upper_bound(poses_.begin(), poses_.end(), pose.stamp, later), pose);
+  poses_.insert(firstAfter(poses_, pose.stamp), pose);
   if (poses_.size() <= kMostWaiting) return std::nullopt;
   const PoseUpdate given_up = poses_.front();
   poses_.pop_front();
@@ -42,15 +42,11 @@ void Trail::add(Stamp stamp, const SE2& odom_from_base, double duration) {
 }
 
 std::optional<SE2> Trail::at(Stamp stamp) const {
-  const auto earlier = [](const Entry& entry, Stamp instant) { return entry.stamp < instant; };
-  const auto after = std::lower_bound(poses_.begin(), poses_.end(), stamp, earlier);
+  const auto after = firstFrom(poses_, stamp);
   if (after == poses_.end()) return std::nullopt;
   if (after->stamp == stamp) return after->odom_from_base;
   if (after == poses_.begin()) return std::nullopt;
-  const auto before = std::prev(after);
-  const double share = seconds(stamp - before->stamp) / seconds(after->stamp - before->stamp);
-  const Eigen::Vector3d motion = between(before->odom_from_base, after->odom_from_base).vector();
-  return compose(before->odom_from_base, SE2(share * motion));
+  return poseBetween(*std::prev(after), *after, stamp);
 }
 
 }  // namespace sckf

@@ -1,4 +1,4 @@
-#include "dense_filter.h"
+#include "core/dense_filter.h"
 
 #include <Eigen/LU>
 #include <cmath>

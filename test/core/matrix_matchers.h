@@ -4,32 +4,19 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
-#include <algorithm>
 
 #include "sckf_odometry/core/se2.h"
 
 namespace sckf {
 
 /// Whether a and b have one shape and differ by at most `tolerance` in every entry. NaN differs from everything.
-template <typename A, typename B>
-::testing::AssertionResult matricesNear(const Eigen::MatrixBase<A>& a, const Eigen::MatrixBase<B>& b,
-                                        double tolerance) {
-  const bool same_shape = a.rows() == b.rows() && a.cols() == b.cols();
-  if (same_shape && ((a - b).array().abs() <= tolerance).all()) return ::testing::AssertionSuccess();
-  ::testing::AssertionResult failure = ::testing::AssertionFailure();
-  failure << "left, " << a.rows() << " x " << a.cols() << ":\n" << a.derived() << "\n";
-  failure << "right, " << b.rows() << " x " << b.cols() << ":\n" << b.derived() << "\n";
-  if (same_shape) failure << "left - right, tolerance " << tolerance << ":\n" << (a - b).eval();
-  return failure;
-}
+::testing::AssertionResult matricesNear(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, double tolerance);
 
 /// As matricesNear(), with the tolerance relative to the largest entry of the two.
-template <typename A, typename B>
-::testing::AssertionResult matricesClose(const Eigen::MatrixBase<A>& a, const Eigen::MatrixBase<B>& b,
-                                         double relative_tolerance) {
-  const auto largest = [](const auto& m) { return m.size() == 0 ? 0.0 : m.array().abs().maxCoeff(); };
-  return matricesNear(a, b, relative_tolerance * std::max(largest(a), largest(b)));
-}
+::testing::AssertionResult matricesClose(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, double relative_tolerance);
+
+/// Of a symmetric matrix: not negative where that is a covariance.
+double smallestEigenvalue(const Eigen::MatrixXd& symmetric);
 
 /// Derivative of f: SE2 → SE2 at x by central differences, both sides in the additive error of se2.h.
 template <typename Function>

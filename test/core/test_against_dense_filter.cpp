@@ -6,9 +6,9 @@
 #include <ostream>
 #include <string>
 
-#include "dense_filter.h"
-#include "matrix_matchers.h"
-#include "random_inputs.h"
+#include "core/dense_filter.h"
+#include "core/matrix_matchers.h"
+#include "core/random_inputs.h"
 #include "sckf_odometry/core/stochastic_cloning_filter.h"
 
 namespace sckf {

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "random_inputs.h"
+#include "core/random_inputs.h"
 #include "sckf_odometry/core/fusion_method.h"
 #include "sckf_odometry/core/odometry_model.h"
 #include "sckf_odometry/experiments/room_simulation.h"

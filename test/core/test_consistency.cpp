@@ -11,8 +11,8 @@
 #include <tuple>
 #include <vector>
 
-#include "chi_squared_band.h"
-#include "random_inputs.h"
+#include "core/chi_squared_band.h"
+#include "core/random_inputs.h"
 #include "sckf_odometry/core/fusion_method.h"
 #include "sckf_odometry/core/odometry_model.h"
 #include "sckf_odometry/experiments/room_simulation.h"

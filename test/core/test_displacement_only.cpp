@@ -3,9 +3,9 @@
 #include <cmath>
 #include <vector>
 
-#include "matrix_matchers.h"
-#include "monte_carlo_covariance.h"
-#include "random_inputs.h"
+#include "core/matrix_matchers.h"
+#include "core/monte_carlo_covariance.h"
+#include "core/random_inputs.h"
 #include "sckf_odometry/core/displacement_only.h"
 
 namespace sckf {
@@ -29,7 +29,7 @@ struct Leg {
 class Way {
  public:
   Way(const std::vector<Leg>& legs, RandomInputs& random) : legs_(legs), P_0_(random.covariance(3, 0.004)) {
-    const Eigen::Matrix3d orthogonal = random.gaussian(3, 3).householderQr().householderQ();
+    const Eigen::Matrix3d orthogonal = random.orthogonal(3);
     SE2 reference_from_current;
     Eigen::MatrixXd J_before = random.gaussian(3, kRanges);
     for (const Leg& leg : legs_) {

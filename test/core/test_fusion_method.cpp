@@ -4,8 +4,8 @@
 #include <memory>
 #include <vector>
 
-#include "matrix_matchers.h"
-#include "random_inputs.h"
+#include "core/matrix_matchers.h"
+#include "core/random_inputs.h"
 #include "sckf_odometry/core/dead_reckoning.h"
 #include "sckf_odometry/core/fusion_method.h"
 #include "sckf_odometry/core/multi_clone_filter.h"

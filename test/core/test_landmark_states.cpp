@@ -4,9 +4,9 @@
 #include <cmath>
 #include <vector>
 
-#include "landmark_robot.h"
-#include "matrix_matchers.h"
-#include "random_inputs.h"
+#include "core/landmark_robot.h"
+#include "core/matrix_matchers.h"
+#include "core/random_inputs.h"
 #include "sckf_odometry/core/multi_clone_filter.h"
 
 namespace sckf {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "matrix_matchers.h"
-#include "random_inputs.h"
+#include "core/matrix_matchers.h"
+#include "core/random_inputs.h"
 #include "sckf_odometry/core/multi_clone_filter.h"
 #include "sckf_odometry/core/stochastic_cloning_filter.h"
 

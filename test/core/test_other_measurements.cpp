@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "chi_squared_band.h"
-#include "matrix_matchers.h"
-#include "random_inputs.h"
+#include "core/chi_squared_band.h"
+#include "core/matrix_matchers.h"
+#include "core/random_inputs.h"
 #include "sckf_odometry/core/multi_clone_filter.h"
 #include "sckf_odometry/experiments/other_measurements.h"
 

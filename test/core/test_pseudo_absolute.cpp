@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 
-#include "chi_squared_band.h"
-#include "matrix_matchers.h"
-#include "random_inputs.h"
+#include "core/chi_squared_band.h"
+#include "core/matrix_matchers.h"
+#include "core/random_inputs.h"
 #include "sckf_odometry/core/covariance_intersection.h"
 #include "sckf_odometry/core/odometry_model.h"
 #include "sckf_odometry/core/pseudo_absolute.h"
@@ -80,14 +80,10 @@ TEST(CovarianceIntersection, LeavesAPoseThatIsKnownExactly) {
   EXPECT_TRUE(matricesNear(same.covariance, Eigen::Matrix3d::Zero(), 0.0));
 }
 
-double smallestEigenvalue(const Eigen::Matrix3d& P) {
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(P, Eigen::EigenvaluesOnly).eigenvalues()(0);
-}
-
 /// A cross-covariance that goes with P and R: L_P U L_Rᵀ with |U| ≤ 1; at strength 1 there is no stronger one.
 Eigen::MatrixXd crossCovariance(const Eigen::MatrixXd& P, const Eigen::MatrixXd& R, double strength,
                                 RandomInputs& random) {
-  const Eigen::Matrix3d U = random.gaussian(3, 3).householderQr().householderQ();
+  const Eigen::Matrix3d U = random.orthogonal(3);
   const Eigen::MatrixXd L_P = P.llt().matrixL();
   const Eigen::MatrixXd L_R = R.llt().matrixL();
   return strength * L_P * U.leftCols(R.rows()) * L_R.transpose();

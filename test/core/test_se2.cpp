@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "matrix_matchers.h"
-#include "random_inputs.h"
+#include "core/matrix_matchers.h"
+#include "core/random_inputs.h"
 #include "sckf_odometry/core/se2.h"
 
 namespace sckf {

@@ -2,9 +2,9 @@
 
 #include <vector>
 
-#include "matrix_matchers.h"
-#include "monte_carlo_covariance.h"
-#include "random_inputs.h"
+#include "core/matrix_matchers.h"
+#include "core/monte_carlo_covariance.h"
+#include "core/random_inputs.h"
 #include "sckf_odometry/core/displacement_covariance.h"
 #include "sckf_odometry/core/se3.h"
 

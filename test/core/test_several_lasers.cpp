@@ -4,7 +4,7 @@
 #include <numeric>
 #include <vector>
 
-#include "chi_squared_band.h"
+#include "core/chi_squared_band.h"
 #include "sckf_odometry/experiments/several_lasers.h"
 
 namespace sckf {

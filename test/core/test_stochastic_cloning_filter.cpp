@@ -6,8 +6,8 @@
 #include <cmath>
 #include <vector>
 
-#include "matrix_matchers.h"
-#include "random_inputs.h"
+#include "core/matrix_matchers.h"
+#include "core/random_inputs.h"
 #include "sckf_odometry/core/stochastic_cloning_filter.h"
 
 namespace sckf {

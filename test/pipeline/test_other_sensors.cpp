@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/matrix_matchers.h"
 #include "pipeline/simulated_drive.h"
 
 namespace sckf::test {

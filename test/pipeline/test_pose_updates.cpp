@@ -7,6 +7,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/random_inputs.h"
 #include "pipeline/simulated_drive.h"
 
 namespace sckf::test {

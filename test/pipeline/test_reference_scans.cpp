@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/matrix_matchers.h"
 #include "pipeline/simulated_drive.h"
 #include "sckf_odometry/core/multi_clone_filter.h"
 #include "sckf_odometry/core/stochastic_cloning_filter.h"

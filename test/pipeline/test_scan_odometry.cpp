@@ -6,6 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "core/matrix_matchers.h"
 #include "pipeline/simulated_drive.h"
 
 namespace sckf::test {

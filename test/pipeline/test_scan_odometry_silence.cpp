@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/matrix_matchers.h"
 #include "pipeline/simulated_drive.h"
 
 namespace sckf::test {

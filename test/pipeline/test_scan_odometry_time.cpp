@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 
+#include "core/matrix_matchers.h"
 #include "pipeline/simulated_drive.h"
 
 namespace sckf::test {
