@@ -80,6 +80,8 @@ std::optional<SE2> planar(double x, double y, const geometry_msgs::Quaternion& o
 
 Stamp toStamp(const ros::Time& time) { return Stamp(static_cast<Stamp::rep>(time.toNSec())); }
 
+Stamp now() { return toStamp(ros::Time::now()); }
+
 ros::Time toTime(Stamp stamp) { return ros::Time().fromNSec(static_cast<uint64_t>(stamp.count())); }
 
 std::string frameName(const std::string& frame) {

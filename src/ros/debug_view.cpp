@@ -9,7 +9,7 @@ namespace sckf {
 
 namespace {
 
-constexpr uint32_t kQueue = 100;  // at fast replay many leave in one go
+constexpr uint32_t kDebugQueue = 100;  // at fast replay many leave in one go
 
 /// The scan drawn in odom; empty if there is none.
 sensor_msgs::PointCloud2 toCloud(const PlacedScan& placed, Stamp stamp, const std::string& frame) {
@@ -31,12 +31,12 @@ void publishIfWatched(const ros::Publisher& publisher, const Build& build) {
 
 DebugView::DebugView(ros::NodeHandle nh, const NodeOptions& options)
     : odom_frame_(options.odom_frame),
-      markers_(nh.advertise<visualization_msgs::MarkerArray>("debug/markers", kQueue)),
-      landmarks_(nh.advertise<visualization_msgs::MarkerArray>("landmarks", kQueue)) {
+      markers_(nh.advertise<visualization_msgs::MarkerArray>("debug/markers", kDebugQueue)),
+      landmarks_(nh.advertise<visualization_msgs::MarkerArray>("landmarks", kDebugQueue)) {
   for (std::size_t laser = 0; laser < rangeTopics(options).size(); ++laser) {
     const std::string number = laser == 0 ? "" : "_" + std::to_string(laser + 1);
-    lasers_.push_back({nh.advertise<sensor_msgs::PointCloud2>("debug/reference_scan" + number, kQueue),
-                       nh.advertise<sensor_msgs::PointCloud2>("debug/aligned_scan" + number, kQueue),
+    lasers_.push_back({nh.advertise<sensor_msgs::PointCloud2>("debug/reference_scan" + number, kDebugQueue),
+                       nh.advertise<sensor_msgs::PointCloud2>("debug/aligned_scan" + number, kDebugQueue),
                        {}});
   }
 }

@@ -1,19 +1,14 @@
 #include "sckf_odometry/ros/estimate_publisher.h"
 
+#include "sckf_odometry/ros/constants.h"
 #include "sckf_odometry/ros/conversions.h"
 
 namespace sckf {
 
-namespace {
-
-constexpr uint32_t kQueue = 1000;  // at fast replay many estimates leave in one go
-
-}  // namespace
-
 EstimatePublisher::EstimatePublisher(ros::NodeHandle nh, const NodeOptions& options)
     : options_(options),
-      odometry_(nh.advertise<nav_msgs::Odometry>("odometry/filtered", kQueue)),
-      pose_(nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", kQueue)),
+      odometry_(nh.advertise<nav_msgs::Odometry>("odometry/filtered", kPublisherQueue)),
+      pose_(nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", kPublisherQueue)),
       path_(nh.advertise<nav_msgs::Path>("path", 1, true)),
       path_odometry_(nh.advertise<nav_msgs::Path>("path_odometry", 1, true)),
       cloud_(nh.advertise<sensor_msgs::PointCloud2>("cloud", 1, true)),

@@ -7,12 +7,6 @@
 
 namespace sckf {
 
-namespace {
-
-Stamp now() { return toStamp(ros::Time::now()); }
-
-}  // namespace
-
 ImuInput::ImuInput(const ImuOptions& options, const std::string& topic, double time_jump, Health& health,
                    Warnings& warnings)
     : options_(options), topic_(topic), health_(health), warnings_(warnings), stamps_(time_jump) {}

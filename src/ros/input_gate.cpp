@@ -13,8 +13,6 @@ namespace {
 
 constexpr char kWrongStamp[] = "refused, wrong stamp";
 
-Stamp now() { return toStamp(ros::Time::now()); }
-
 std::string turnedRound(const sensor_msgs::LaserScan& scan) {
   std::ostringstream text;
   text << "angle_min is " << scan.angle_min << ", angle_max " << scan.angle_max << ", angle_increment "

@@ -1,18 +1,13 @@
 #include "sckf_odometry/ros/map_publisher.h"
 
+#include "sckf_odometry/ros/constants.h"
 #include "sckf_odometry/ros/conversions.h"
 
 namespace sckf {
 
-namespace {
-
-constexpr uint32_t kQueue = 1000;  // at fast replay many estimates leave in one go
-
-}  // namespace
-
 MapPublisher::MapPublisher(ros::NodeHandle nh, const Options& options) : options_(options.node) {
   if (!options.pipeline.pose_updates.on) return;
-  pose_ = nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose_in_map", kQueue);
+  pose_ = nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose_in_map", kPublisherQueue);
 }
 
 void MapPublisher::publish(const MapEstimate& estimate) {

@@ -5,13 +5,13 @@
 #include <stdexcept>
 #include <string>
 
+#include "sckf_odometry/ros/constants.h"
+
 namespace sckf {
 
 namespace {
 
 using sckf_odometry::ScKfOdometryConfig;
-
-constexpr char kLogger[] = "sckf_odometry";
 
 /// What a client asks for.
 class ConfigSource : public ParameterSource {

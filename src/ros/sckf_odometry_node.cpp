@@ -7,14 +7,12 @@
 #include <stdexcept>
 
 #include "sckf_odometry/Status.h"
+#include "sckf_odometry/ros/constants.h"
 #include "sckf_odometry/ros/conversions.h"
 
 namespace sckf {
 
 namespace {
-
-constexpr char kLogger[] = "sckf_odometry";
-constexpr uint32_t kQueue = 1000;  // at fast replay many messages leave in one go
 
 /// With odometry on TF, base_frame has a parent there already.
 NodeOptions withOdometryOnTf(NodeOptions options) {
@@ -57,7 +55,7 @@ ScKfOdometryNode::ScKfOdometryNode(ros::NodeHandle nh, const ros::NodeHandle& pr
       publisher_(nh, options_.node),
       map_publisher_(nh, options_),
       debug_view_(nh, options_.node),
-      status_publisher_(nh.advertise<sckf_odometry::Status>("status", kQueue)),
+      status_publisher_(nh.advertise<sckf_odometry::Status>("status", kPublisherQueue)),
       health_(odometry_source_, scan_topics_),
       pose_keeper_(options_.node),
       gate_(options_.node, odometry_source_, scan_topics_, health_, warnings_),

@@ -14,12 +14,12 @@
 #include <vector>
 
 #include "sckf_odometry/core/covariance.h"
+#include "sckf_odometry/ros/constants.h"
 
 namespace sckf {
 
 namespace {
 
-constexpr char kLogger[] = "sckf_odometry";
 constexpr char kContent[] = "odom_frame, base_frame, stamp [ns], pose [x, y, yaw], covariance [3 x 3]";
 
 std::vector<double> numbers(const YAML::Node& node, std::size_t count) {

@@ -20,6 +20,8 @@
 namespace sckf {
 
 Stamp toStamp(const ros::Time& time);
+/// ROS time: a clock's, or the one on /clock.
+Stamp now();
 ros::Time toTime(Stamp stamp);
 
 /// The name without the leading slash that old drivers put before it and tf2 refuses.
