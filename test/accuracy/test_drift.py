@@ -22,6 +22,7 @@ from backwards import turn_round  # noqa: E402
 from crowd import crowd  # noqa: E402
 from logs import MALAGA, installed, recorded, run, simulated  # noqa: E402
 from recording import halved, read_recording  # noqa: E402
+from reference_noise import measured, shares  # noqa: E402
 from revisit import closure, find_revisits  # noqa: E402
 from trajectory import Trajectory, between, drift, read_tum, sample  # noqa: E402
 from turned_laser import turn_laser  # noqa: E402
@@ -136,6 +137,14 @@ class DriftTest(unittest.TestCase):
         self.check_backwards("aces", 1.65, 0.085)
         self.check_backwards("freiburg-079", 1.3, 0.12)
 
+    def test_on_freiburg_the_reference_errs_by_more_than_the_estimate(self) -> None:
+        """Even where the estimate has half of the scans."""
+        bag = recorded("freiburg-079")
+        for each in measured(bag, bag.with_suffix(".tum")):
+            print(f"\nfreiburg-079, {each.length:g} m: halves differ by {each.of_halves:.2f} %, the reference errs by "
+                  f"{each.of_reference:.2f} %")
+            self.assertLess(each.of_halves / np.sqrt(2.0), each.of_reference)
+
     def check_worse(self, log: str, told: Told, percent: float, deg_per_m: float) -> None:
         bag = recorded(log)
         worse = self.path("worse.bag")
@@ -217,6 +226,24 @@ class DriftTest(unittest.TestCase):
                            float(np.degrees(np.median([each.rotation for each in closures]))))
 
         self.check(Row("malaga", "m,°", median("dead_reckoning"), median("sckf_multi"), Figures(0.35, 1.0)))
+
+
+class ReferenceNoiseTest(unittest.TestCase):
+
+    def test_three_errors_are_told_apart(self) -> None:
+        """Along a straight way, each pose off by so much in x and in y, and none in yaw."""
+        random = np.random.default_rng(1)
+        truth = np.column_stack([np.arange(0.0, 1000.0, 0.25), np.zeros(4000), np.zeros(4000)])
+
+        def off_by(std: float) -> Trajectory:
+            noise = np.column_stack([random.normal(0.0, std, (4000, 2)), np.zeros(4000)])
+            return Trajectory(np.arange(4000.0) * 0.1, truth + noise)
+
+        reference, halves = off_by(0.02), [off_by(0.01), off_by(0.01)]
+        for each in shares(reference, halves):
+            at_ends = 100.0 * np.sqrt(2.0 * 2.0) / each.length  # of an std of each axis, in percent
+            self.assertAlmostEqual(each.of_reference / (at_ends * 0.02), 1.0, delta=0.05)
+            self.assertAlmostEqual(each.of_halves / (at_ends * 0.01 * np.sqrt(2.0)), 1.0, delta=0.05)
 
 
 if __name__ == "__main__":
