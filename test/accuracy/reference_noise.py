@@ -3,7 +3,8 @@
 
 Every other scan of the log makes one estimate, the other ones another, and neither knows of the reference. By how much
 the three differ from each other tells how far each is off, where their errors are independent: the square of what the
-reference errs by is half of the squares of its distances from the two less that of theirs from each other.
+reference errs by is half of the squares of its distances from the two less that of theirs from each other. What the two
+estimates have in common, wheels and the laser's systematic errors, is counted to the reference: it errs by at most so much.
 """
 from __future__ import annotations
 
