@@ -27,8 +27,9 @@ bool FreeSpace::contains(const Eigen::Vector2d& point) const {
   double beam = (std::atan2(d.y(), d.x()) - first_bearing_) / increment_ + 0.5;  // rounded when it is cut off below
   if (beam < 0.0) beam += beams_in_a_turn_;
   if (beam >= beams_in_a_turn_) beam -= beams_in_a_turn_;
-  const auto k = static_cast<std::size_t>(beam);
-  return k < square_reach_.size() && d.squaredNorm() < square_reach_[k];
+  // Before it is made an integer: beams may be so near each other that it is one of more than there are integers.
+  if (!(beam < static_cast<double>(square_reach_.size()))) return false;
+  return d.squaredNorm() < square_reach_[static_cast<std::size_t>(beam)];
 }
 
 }  // namespace sckf

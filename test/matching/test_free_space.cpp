@@ -98,5 +98,14 @@ TEST(FreeSpace, ALaserAllRoundHasNoEdgeAtTheTurn) {
     EXPECT_TRUE(free.contains(at(3.0, degrees))) << degrees;
 }
 
+TEST(FreeSpace, BeamsMayBeSoNearEachOtherThatNoIntegerCountsThem) {
+  LaserScan scan = fan();
+  for (const double increment : {1e-30, -1e-30}) {
+    scan.angle_increment = increment;
+    const FreeSpace free = freeSpace(scan);
+    for (const double degrees : {-170.0, -10.0, 0.0, 10.0, 90.0}) EXPECT_FALSE(free.contains(at(1.0, degrees)));
+  }
+}
+
 }  // namespace
 }  // namespace sckf::test
