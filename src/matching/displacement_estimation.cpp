@@ -237,7 +237,8 @@ ConstantEvidence sweepDuration(const LossDerivatives& loss, const ObservableDire
 
 std::optional<DisplacementEstimate> estimateDisplacement(const AlignmentProblem& problem, const SE2& start,
                                                          const EstimationOptions& options) {
-  const ObservableDirections seen = observableDirections(problem.normalEquations(start), options.observability);
+  const NormalEquations equations = problem.normalEquations(start);
+  const ObservableDirections seen = observableDirections(equations, options.observability);
   if (seen.dimension() == 0) return std::nullopt;
   const SE2 x = minimise(problem, start, seen);
   const LossDerivatives loss = differentiate(problem, RigidMotion(x), options);
@@ -255,10 +256,17 @@ std::optional<DisplacementEstimate> estimateDisplacement(const AlignmentProblem&
   z.matching_noise = MatrixDD::Zero(seen.dimension(), seen.dimension());
   z.matching_noise = matchingNoise(z.covariance(), seenCovariance(loss, seen, hessian), loss.blocks.size(),
                                    options.matching_inflation);
+  estimate.decisive = decisivePlace(problem, x, seen, equations.lever, options.place_size);
+  z.matching_noise += placeNoise(z, estimate.decisive, options.place_std);
   estimate.range_offset = rangeOffset(problem, loss, seen);
   estimate.sweep_duration = sweepDuration(loss, seen);
   estimate.residual_rms = std::sqrt(loss.meanSquare());
   return estimate;
+}
+
+MatrixDD placeNoise(const Displacement& displacement, const DecisivePlace& place, double std) {
+  const Eigen::Matrix<double, Eigen::Dynamic, 2, 0, 3, 2> moved = std * displacement.observable * place.influence;
+  return moved * moved.transpose();
 }
 
 Displacement meanOfBothWays(const Displacement& there, const Displacement& back) {

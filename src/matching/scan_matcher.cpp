@@ -53,6 +53,13 @@ class Search {
   /// From the predicted displacement and nowhere else.
   std::optional<Alignment> runNear() const { return align(mean_, options_.pairs.max_distance); }
 
+  /// The same of all other points.
+  std::optional<Alignment> runNearWithout(const DecisivePlace& place) const {
+    Search others = *this;
+    others.left_out_ = place;
+    return others.runNear();
+  }
+
   /// At the predicted displacement, as it is: points are paired once. Empty with too few pairs.
   std::optional<Alignment> there() const {
     AlignmentProblem problem(reference_, current_, mean_, options_.pairs.max_distance, options_.pairs);
@@ -123,7 +130,7 @@ class Search {
     constexpr double kSettled = 1e-3;  // [m, rad] points do not change partners for less; the estimate finds the rest
     NearestNeighbours neighbours(reference_, current_);
     for (int i = 1;; ++i) {
-      AlignmentProblem problem(reference_, current_, x, neighbours.pairs(RigidMotion(x), distance), options_.pairs);
+      AlignmentProblem problem(reference_, current_, x, pairsAt(x, distance, neighbours), options_.pairs);
       if (!hasEnoughPairs(problem)) return std::nullopt;
       const Eigen::Vector3d step = mapStep(problem.normalEquations(x), x);
       x = corrected(x, step);
@@ -133,6 +140,13 @@ class Search {
       }
       distance = std::max(options_.pairs.max_distance, 0.6 * distance);
     }
+  }
+
+  std::vector<Pair> pairsAt(const SE2& x, double distance, NearestNeighbours& neighbours) const {
+    std::vector<Pair> pairs = neighbours.pairs(RigidMotion(x), distance);
+    const auto isLeftOut = [this](const Pair& pair) { return left_out_.contains(pair.current); };
+    pairs.erase(std::remove_if(pairs.begin(), pairs.end(), isLeftOut), pairs.end());
+    return pairs;
   }
 
   bool hasEnoughPairs(const AlignmentProblem& problem) const {
@@ -189,6 +203,7 @@ class Search {
   SE2 mean_;
   Eigen::Matrix3d prior_information_;
   const MatcherOptions& options_;
+  DecisivePlace left_out_;  // whose points have no partner
 };
 
 bool ranAway(const SE2& estimated, const SE2& aligned, const MatcherOptions& options) {
@@ -210,6 +225,7 @@ Match concluded(const std::optional<Alignment>& aligned, const MatcherOptions& o
   match.agreement = aligned->problem.agreement();
   if (estimate) {
     match.residual_rms = estimate->residual_rms;
+    match.decisive = estimate->decisive;
     match.range_offset = estimate->range_offset;
     match.sweep_duration = estimate->sweep_duration;
   }
@@ -225,6 +241,30 @@ Match concluded(const std::optional<Alignment>& aligned, const MatcherOptions& o
     match.displacement.emplace(std::move(estimate->displacement));
   }
   return match;
+}
+
+/// The squared Mahalanobis distance of a match from its prediction. What its decisive place may be off by does not
+/// count: whether it is off is what is asked.
+double contradiction(const Match& match, const DisplacementPrediction& prediction, const EstimationOptions& options) {
+  const Displacement& z = *match.displacement;
+  const Displacement::MatrixDD covariance = z.observable * prediction.covariance * z.observable.transpose() +
+                                            z.covariance() - placeNoise(z, match.decisive, options.place_std);
+  const Eigen::VectorXd e = z.observable * error(z.reference_from_current, prediction.reference_from_current);
+  return e.dot(covariance.ldlt().solve(e));
+}
+
+/// The match without the place that decides most of it, if that place contradicts the prediction and nothing else does:
+/// rather than the wheels have slipped, somebody walks there. Where they have, what else is seen contradicts them, too.
+std::optional<Match> withoutMovedPlace(const Match& match, const Search& search,
+                                       const DisplacementPrediction& prediction, const MatcherOptions& options) {
+  constexpr double kContradicts = 4.0;  // two sigma: not much is lost where the place is left out for nothing
+  const double min_share = options.moved_place_min_share;
+  if (min_share <= 0.0 || !match.displacement || match.decisive.share() < min_share) return std::nullopt;
+  if (contradiction(match, prediction, options.estimation) <= kContradicts) return std::nullopt;
+  Match others = concluded(search.runNearWithout(match.decisive), options);
+  if (!others.displacement || contradiction(others, prediction, options.estimation) > kContradicts) return std::nullopt;
+  others.place_left_out = true;
+  return others;
 }
 
 /// The match refined by one of the scans with their roles exchanged, paired where they lie by now, if there is one
@@ -265,8 +305,10 @@ std::string toString(MatchFailure failure) {
 
 Match ScanMatcher::match(const PreparedScan& reference, const PreparedScan& current,
                          const DisplacementPrediction& prediction) const {
-  const std::optional<Alignment> aligned = Search(reference, current, prediction, options_).run();
-  return refinedByReturn(concluded(aligned, options_), reference, current, options_);
+  const Search search(reference, current, prediction, options_);
+  const Match match = concluded(search.run(), options_);
+  if (std::optional<Match> others = withoutMovedPlace(match, search, prediction, options_)) return *std::move(others);
+  return refinedByReturn(match, reference, current, options_);
 }
 
 Match ScanMatcher::matchNear(const PreparedScan& reference, const PreparedScan& current,

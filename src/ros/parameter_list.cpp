@@ -215,6 +215,7 @@ List matcherParameters(MatcherOptions& matcher) {
       number("min_pairs", matcher.min_pairs, within(3, 1000000), "points"),
       number("min_overlap", matcher.min_overlap, within(0.0, 1.0)),
       number("min_agreement", matcher.min_agreement, within(0.0, 1.0)),
+      number("moved_place_min_share", matcher.moved_place_min_share, within(0.0, 1.0)),
       number("max_refinement", matcher.max_refinement, aboveUpTo(0.0, 100.0), "m, rad"),
       number("max_correspondence_dist", pairs.max_distance, aboveUpTo(0.0, 100.0), "m"),
       number("max_normal_angle", pairs.max_normal_angle, aboveUpTo(0.0, 10.0), "rad"),
@@ -226,6 +227,8 @@ List matcherParameters(MatcherOptions& matcher) {
       number("observable_min_information_ratio", estimation.observability.min_information_ratio, within(0.0, 1e6)),
       number("correlated_beams", estimation.correlated_beams, within(1, 10000), "beams"),
       number("matching_inflation", estimation.matching_inflation, within(0.0, 1000.0)),
+      number("place_size", estimation.place_size, aboveUpTo(0.0, 100.0), "m"),
+      number("place_std", estimation.place_std, within(0.0, 10.0), "m"),
   };
 }
 

@@ -55,16 +55,16 @@ class DisplacementsTest(OnLogs):
     PATTERN = r"NEES, with the reference's own error: median (\S+) .* (\S+) below 11.34"
 
     def test_intel(self) -> None:
-        self.check_recorded("intel", Found(2.8, 0.89))
+        self.check_recorded("intel", Found(2.2, 0.93))
 
     def test_aces(self) -> None:
-        self.check_recorded("aces", Found(2.2, 0.94))
+        self.check_recorded("aces", Found(1.8, 0.95))
 
     def test_freiburg_079(self) -> None:
-        self.check_recorded("freiburg-079", Found(3.9, 0.79))
+        self.check_recorded("freiburg-079", Found(3.2, 0.85))
 
     def test_simulated_log_of_mrpt(self) -> None:
-        self.check_simulated(Found(2.2, 0.94))
+        self.check_simulated(Found(1.9, 0.955))
 
 
 class WindowsTest(OnLogs):
@@ -73,16 +73,16 @@ class WindowsTest(OnLogs):
     PATTERN = r"NEES at their ends, median (\S+) .*inside 3 sigma: x (\S+), y (\S+), yaw (\S+) "
 
     def test_intel(self) -> None:
-        self.check_recorded("intel", Found(1.7, 0.945))
+        self.check_recorded("intel", Found(0.9, 0.985))
 
     def test_aces(self) -> None:
-        self.check_recorded("aces", Found(2.0, 0.98))
+        self.check_recorded("aces", Found(1.4, 0.985))
 
     def test_freiburg_079(self) -> None:
-        self.check_recorded("freiburg-079", Found(5.3, 0.87))
+        self.check_recorded("freiburg-079", Found(2.5, 0.935))
 
     def test_simulated_log_of_mrpt(self) -> None:
-        self.check_simulated(Found(3.2, 0.975))
+        self.check_simulated(Found(2.7, 0.98))
 
 
 class WhitenessTest(ScriptCase):

@@ -40,4 +40,18 @@ inline World rough(const World& smooth, double roughness) {
   return world;
 }
 
+/// Two legs of somebody who stands there.
+inline World withSomebodyAt(World world, const Eigen::Vector2d& place) {
+  for (const double side : {-0.12, 0.12}) {
+    std::vector<Eigen::Vector2d> corners;
+    for (int k = 0; k < 8; ++k) {
+      const double angle = k * M_PI / 4.0;
+      corners.push_back(place + Eigen::Vector2d(0.07 * std::cos(angle), side + 0.07 * std::sin(angle)));
+    }
+    const World leg = closedPolygon(corners);
+    world.insert(world.end(), leg.begin(), leg.end());
+  }
+  return world;
+}
+
 }  // namespace sckf::test

@@ -543,11 +543,13 @@ TEST(ScanOdometryFaults, OnACarpetTheSlipIsSeenAndCounted) {
 /// Monte Carlo over carpets: the covariance can be believed on it and after it.
 TEST(ScanOdometryFaults, OnACarpetTheCovarianceCanBeBelieved) {
   constexpr int kRuns = 20;
+  PipelineOptions options = trustingTheWheels();
+  options.matcher.estimation.place_std = 0.0;  // in this room everything is where it seems to be
   double on_carpet = 0.0;
   double after = 0.0;
   for (int run = 1; run <= kRuns; ++run) {
     const SimulatedDrive drive = overACarpet(static_cast<std::uint64_t>(run));
-    Driven driven(drive, trustingTheWheels());
+    Driven driven(drive, options);
     driven.odometry(0);
     driven.run(0, 8000);
     for (const ScanReport& report : driven.reports) {
@@ -592,6 +594,37 @@ TEST(ScanOdometryFaults, AlongACorridorTheWheelsTellTheWay) {
   // Along: 0.05 m/√m over 5 m, and 0.02 of them. Across, the scans.
   EXPECT_NEAR(std::sqrt(last.covariance(0, 0)), std::hypot(0.05 * std::sqrt(5.15), 0.02 * 5.15), 0.01);
   EXPECT_LT(last.covariance(1, 1), 0.1 * last.covariance(0, 0));
+}
+
+/// Somebody walks before the robot along a corridor that shows nothing else of the way: to the scans the robot would
+/// stand.
+TEST(ScanOdometryFaults, AlongACorridorWhoWalksAheadDoesNotHoldTheRobot) {
+  const auto ahead = [](double t) { return SE2(0.4 * t, 0.2, 0.0); };
+  const auto errorAlong = [&ahead](double min_share) {
+    Wheels wheels;
+    wheels.scale = 1.0;
+    wheels.yaw_per_meter = 0.0;
+    const SimulatedDrive drive(wheels, 20000, corridor(), ahead);
+    PipelineOptions options;
+    options.matcher.moved_place_min_share = min_share;
+    Driven driven(drive, options);
+    driven.odometry(0);
+    std::mt19937_64 random(2);
+    SimulatedLaser laser = drive.laser;
+    laser.range_max = 12.0;
+    for (int ms = 20; ms <= 20000; ms += 20) {
+      driven.odometry(ms);
+      if (ms % 400 != 0) continue;
+      const SE2 robot = ahead(1e-3 * ms);
+      const World world = withSomebodyAt(corridor(), {robot.x + 2.5, 0.5});
+      LaserScan scan = simulateScan(world, robot, laser, &random);
+      scan.stamp = at(ms);
+      driven.scan(scan);
+    }
+    return driven.latestError(20000).x();
+  };
+  EXPECT_LT(std::abs(errorAlong(0.5)), 0.2) << "of 8 m";
+  EXPECT_LT(errorAlong(0.0), -1.0) << "nothing holds the robot: no test";
 }
 
 }  // namespace

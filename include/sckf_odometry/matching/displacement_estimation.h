@@ -5,6 +5,7 @@
 
 #include "sckf_odometry/core/displacement.h"
 #include "sckf_odometry/matching/alignment_problem.h"
+#include "sckf_odometry/matching/decisive_place.h"
 #include "sckf_odometry/matching/observability.h"
 
 namespace sckf {
@@ -13,6 +14,8 @@ struct EstimationOptions {
   ObservabilityOptions observability;
   int correlated_beams = 15;        ///< residuals of this many neighbouring beams may err together
   double matching_inflation = 3.0;  ///< of what residuals show beyond range noise: they do not show all of it
+  double place_size = 0.6;          ///< [m] what stands so close together is a place: it moves, or is mistaken, as one
+  double place_std = 0.03;          ///< [m] the place that decides most of the displacement may be off by this
 };
 
 /// What a match tells of a constant of the laser that bends what both scans see, the same wall otherwise from each
@@ -27,6 +30,7 @@ struct DisplacementEstimate {
   Displacement displacement;
   ConstantEvidence range_offset;    ///< to be added to each range of both scans [m]
   ConstantEvidence sweep_duration;  ///< EvenSweep::duration of both [s]
+  DecisivePlace decisive;           ///< the place that decides most of it
   double residual_rms = 0.0;        ///< of the weighted residuals: 1 where the noise explains them
 };
 
@@ -39,6 +43,11 @@ struct DisplacementEstimate {
 std::optional<DisplacementEstimate> estimateDisplacement(const AlignmentProblem& problem,
                                                          const SE2& reference_from_current,
                                                          const EstimationOptions& options);
+
+/// The covariance, d × d, of a displacement whose decisive place is off by so much [m] in x and in y: its part of
+/// matching_noise. What nothing else confirms may have moved, or be no surface but a few points of what is seen
+/// otherwise from each place; residuals show nothing of it, since such a place pulls the displacement onto itself.
+Displacement::MatrixDD placeNoise(const Displacement& displacement, const DecisivePlace& place, double std);
 
 /// The mean of a displacement and of that of the same scans with their roles exchanged, both of dimension 3. The same
 /// ranges are in both, by Jacobians that add; which points and surfaces are taken together is not the same, and errs

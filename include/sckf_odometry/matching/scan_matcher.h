@@ -25,9 +25,11 @@ struct MatcherOptions {
   int search_yaw_steps = 4;             ///< start yaws to either side of the prediction
   double wide_search_below_agreement = 0.7;  ///< if they still do, wherever the scans may fall together
   WideSearchOptions wide_search;
-  int min_pairs = 10;           ///< fewer points with a partner are "too few pairs"
-  double min_overlap = 0.1;     ///< a smaller share of the points with a partner is "no overlap"
-  double min_agreement = 0.6;   ///< less agreement of the scans is a contradiction, and no match
+  int min_pairs = 10;                  ///< fewer points with a partner are "too few pairs"
+  double min_overlap = 0.1;            ///< a smaller share of the points with a partner is "no overlap"
+  double min_agreement = 0.6;          ///< less agreement of the scans is a contradiction, and no match
+  double moved_place_min_share = 0.5;  ///< DecisivePlace::share() from which on a place that contradicts the prediction
+                                       ///< is left out if what is left does not; 0: never
   double max_refinement = 0.5;  ///< [m, rad] a larger correction of the aligned pose by the estimate is "diverged"
   PairOptions pairs;
   EstimationOptions estimation;
@@ -51,6 +53,8 @@ struct Match {
   std::vector<Pair> pairs;          ///< at the aligned pose
   double overlap = 0.0;             ///< share of the points of the current scan that have a partner, 0 to 1
   double agreement = 0.0;           ///< AlignmentProblem::agreement(), 0 to 1
+  DecisivePlace decisive;           ///< the place that decides most of the displacement
+  bool place_left_out = false;      ///< another place decided more, and seems to have moved
   ConstantEvidence range_offset;    ///< DisplacementEstimate::range_offset
   ConstantEvidence sweep_duration;  ///< DisplacementEstimate::sweep_duration
   double residual_rms = 0.0;        ///< of the weighted residuals: 1 where the noise explains them
@@ -61,7 +65,8 @@ class ScanMatcher {
   explicit ScanMatcher(const MatcherOptions& options) : options_(options) {}
 
   /// The displacement of base_link from the reference scan to the current one. The prediction guides the search and
-  /// the pairing of points; into the displacement itself it enters only in directions that the scans do not see.
+  /// the pairing of points; into the displacement itself it enters only in directions that the scans do not see; and it
+  /// decides whether a place on which a direction hangs has moved.
   Match match(const PreparedScan& reference, const PreparedScan& current,
               const DisplacementPrediction& prediction) const;
 
