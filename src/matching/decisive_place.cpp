@@ -65,7 +65,7 @@ DecisivePlace decisivePlace(const AlignmentProblem& problem, const SE2& x, const
     forEachOfPlace(problem, begin, size, [&](std::size_t k) { sum += by_position[k]; });
     const Matrix32 influence = response * sum;
     const double moved = (in_metres.asDiagonal() * influence).squaredNorm();
-    if (moved <= most) continue;
+    if (!(moved > most)) continue;  // or is no number
     most = moved;
     decisive_begin = begin;
     decisive.influence = influence;

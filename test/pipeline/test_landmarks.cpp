@@ -313,7 +313,7 @@ TEST(Landmarks, OnALoopTheSecondPassFallsOnTheFirst) {
     options.reference.kf_dist_linear = 0.1;  // so that there is a drift to be taken back
     options.reference.kf_dist_angular = 0.3;
     options.reference.older_compared = 0;
-    options.reference.matching_common = 0.0;  // straight walls are taken wrong by noise alone, each time anew
+    options.reference.matching_common = 0.0;     // straight walls are taken wrong by noise alone, each time anew
     options.matcher.estimation.place_std = 0.0;  // and nothing else
     options.matcher.both_ways = false;
     Driven driven(drive, options);
