@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace sckf {
 
@@ -144,6 +145,7 @@ class Search {
 
   std::vector<Pair> pairsAt(const SE2& x, double distance, NearestNeighbours& neighbours) const {
     std::vector<Pair> pairs = neighbours.pairs(RigidMotion(x), distance);
+    if (left_out_.points.empty()) return pairs;
     const auto isLeftOut = [this](const Pair& pair) { return left_out_.contains(pair.current); };
     pairs.erase(std::remove_if(pairs.begin(), pairs.end(), isLeftOut), pairs.end());
     return pairs;
@@ -225,7 +227,7 @@ Match concluded(const std::optional<Alignment>& aligned, const MatcherOptions& o
   match.agreement = aligned->problem.agreement();
   if (estimate) {
     match.residual_rms = estimate->residual_rms;
-    match.decisive = estimate->decisive;
+    match.decisive = std::move(estimate->decisive);
     match.range_offset = estimate->range_offset;
     match.sweep_duration = estimate->sweep_duration;
   }
@@ -306,9 +308,9 @@ std::string toString(MatchFailure failure) {
 Match ScanMatcher::match(const PreparedScan& reference, const PreparedScan& current,
                          const DisplacementPrediction& prediction) const {
   const Search search(reference, current, prediction, options_);
-  const Match match = concluded(search.run(), options_);
+  Match match = concluded(search.run(), options_);
   if (std::optional<Match> others = withoutMovedPlace(match, search, prediction, options_)) return *std::move(others);
-  return refinedByReturn(match, reference, current, options_);
+  return refinedByReturn(std::move(match), reference, current, options_);
 }
 
 Match ScanMatcher::matchNear(const PreparedScan& reference, const PreparedScan& current,

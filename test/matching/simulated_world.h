@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <random>
+#include <utility>
+#include <vector>
 
 #include "sckf_odometry/experiments/simulated_world.h"
 
@@ -40,6 +42,12 @@ inline World rough(const World& smooth, double roughness) {
   return world;
 }
 
+inline World withPolygon(World world, const std::vector<Eigen::Vector2d>& corners) {
+  const World polygon = closedPolygon(corners);
+  world.insert(world.end(), polygon.begin(), polygon.end());
+  return world;
+}
+
 /// Two legs of somebody who stands there.
 inline World withSomebodyAt(World world, const Eigen::Vector2d& place) {
   for (const double side : {-0.12, 0.12}) {
@@ -48,8 +56,7 @@ inline World withSomebodyAt(World world, const Eigen::Vector2d& place) {
       const double angle = k * M_PI / 4.0;
       corners.push_back(place + Eigen::Vector2d(0.07 * std::cos(angle), side + 0.07 * std::sin(angle)));
     }
-    const World leg = closedPolygon(corners);
-    world.insert(world.end(), leg.begin(), leg.end());
+    world = withPolygon(std::move(world), corners);
   }
   return world;
 }

@@ -13,9 +13,7 @@ World withBoxAt(World world, const Eigen::Vector2d& place) {
   std::vector<Eigen::Vector2d> corners;
   for (const double angle : {0.6, 2.2, 3.7, 5.3})
     corners.push_back(place + 0.25 * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
-  const World box = closedPolygon(corners);
-  world.insert(world.end(), box.begin(), box.end());
-  return world;
+  return withPolygon(std::move(world), corners);
 }
 
 struct Scene {
@@ -67,17 +65,27 @@ TEST(DecisivePlace, DecidesAlongACorridorAndLittleInARoom) {
   EXPECT_FALSE(DecisivePlace().contains(0));
 }
 
+/// Between two legs the wall behind is seen.
+TEST(DecisivePlace, IsWhatStandsTogether) {
+  const SE2 motion(0.1, 0.0, 0.02);
+  const World world = withSomebodyAt(corridor(), {2.5, 0.3});
+  const auto shareOfPlacesOf = [&](double size) {
+    MatcherOptions options;
+    options.estimation.place_size = size;
+    return Scene{world, world, motion, motion}.match(options).decisive.share();
+  };
+  EXPECT_GT(shareOfPlacesOf(0.6), 0.9) << "somebody";
+  EXPECT_LT(shareOfPlacesOf(0.12), 0.75) << "a leg";
+}
+
 TEST(DecisivePlace, ItsInfluenceIsHowFarTheDisplacementGoesWithIt) {
   constexpr double kStep = 0.01;
   const SE2 motion(0.1, 0.0, 0.02);
   const Eigen::Vector2d place(2.0, 0.6);
   const World before = withBoxAt(corridor(), place);
-  const MatcherOptions options = [] {
-    MatcherOptions one_way;
-    one_way.both_ways = false;
-    one_way.moved_place_min_share = 0.0;
-    return one_way;
-  }();
+  MatcherOptions options;
+  options.both_ways = false;
+  options.moved_place_min_share = 0.0;
   const Match match = Scene{before, before, motion, motion, 0.03, 0.0}.match(options);
   ASSERT_TRUE(match.displacement && match.displacement->dimension() == 3);
   const Scene ahead{before, withBoxAt(corridor(), place + Eigen::Vector2d(kStep, 0.0)), motion, motion, 0.03, 0.0};

@@ -233,6 +233,11 @@ TEST(Covariance, IsHardlyTooLargeWhereThereIsNoMatchingNoise) {
   expectRatios(monteCarlo(room(), SE2(0.2, 0.05, 0.1), 0.02, 400, 3, inflating(3.0)), 0.85, 1.35);
 }
 
+/// Nor is anything off by what the place that decides most may be off by.
+TEST(Covariance, IsTooLargeByWhatAPlaceMayBeOffBy) {
+  expectRatios(monteCarlo(room(), SE2(0.2, 0.05, 0.1), 0.02, 400, 3), 0.85, 1.75);
+}
+
 /// Of the scans of one pair, matched each way.
 Displacement someDisplacement(const SE2& displacement, const Eigen::Matrix3d& observable, double slope) {
   Displacement z;
