@@ -210,12 +210,22 @@ class CommandTest(unittest.TestCase):
         self.assertEqual([each["length"] for each in result["per_length"]], [2.0, 8.0])
         self.assertAlmostEqual(result["translation_percent"], 2.0, places=4)
 
+    def test_the_reference_of_another_point_of_the_robot(self) -> None:
+        body = circle()
+        write_tum(self.estimate, body)
+        write_tum(self.reference, Trajectory(body.stamps, compose(body.poses, np.array([-0.3, 0.1, 0.0]))))
+        for point, drifts in ((["--point", "-0.3", "0.1"], False), ([], True)):
+            done = self.run_evaluate(str(self.reference), str(self.estimate), "--json", *point)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(json.loads(done.stdout)["translation_percent"] > 1e-3, drifts, done.stdout)
+
     def test_bad_input_is_told_without_a_traceback(self) -> None:
-        for arguments in (["none.tum", str(self.estimate)], [str(self.reference), str(self.estimate), "--lengths=0"]):
+        both = [str(self.reference), str(self.estimate)]
+        for arguments in (["none.tum", str(self.estimate)], [*both, "--lengths=0"], [*both, "--point", "inf", "0"]):
             done = self.run_evaluate(*arguments)
             self.assertNotEqual(done.returncode, 0)
             self.assertNotIn("Traceback", done.stderr)
-            self.assertRegex(done.stderr, "none.tum: No such file|every length must be positive")
+            self.assertRegex(done.stderr, "none.tum: No such file|every length must be positive|a finite number of metres: inf")
 
 
 @unittest.skipUnless(os.environ.get("SCKF_DATA"), "SCKF_DATA does not name the folder of recorded logs")
