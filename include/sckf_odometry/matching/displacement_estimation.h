@@ -13,9 +13,9 @@ namespace sckf {
 struct EstimationOptions {
   ObservabilityOptions observability;
   int correlated_beams = 15;        ///< residuals of this many neighbouring beams may err together
-  double matching_inflation = 3.0;  ///< of what residuals show beyond range noise: they do not show all of it
+  double matching_inflation = 2.5;  ///< of what residuals show beyond range noise: they do not show all of it
   double place_size = 0.6;          ///< [m] what stands so close together is a place: it moves, or is mistaken, as one
-  double place_std = 0.03;          ///< [m] the place that decides most of the displacement may be off by this
+  double place_std = 0.035;         ///< [m] the place that decides most of the displacement may be off by this
 };
 
 /// What a match tells of a constant of the laser that bends what both scans see, the same wall otherwise from each
