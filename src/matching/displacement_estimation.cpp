@@ -91,6 +91,7 @@ struct LossDerivatives {
   Eigen::Matrix3Xd by_reference;                      // ∂²L/∂x∂z_k, 3 × M_k
   Eigen::Matrix3Xd by_current;                        // ∂²L/∂x∂z_{k+m}, 3 × M_{k+m}
   std::vector<BeamBlock> blocks;                      // of which the hessian is the sum
+  std::vector<PointPull> pulls;                       // ∂²L/∂x∂p with weights fixed
   WeightedSquares squares;
   double weight = 0.0;  // Σ w
   ByConstant by_range_offset;
@@ -166,15 +167,24 @@ inline void addDerivatives(const AlignmentProblem& problem, const Residual& resi
   out.by_sweep_duration.add(w, residual, t, residual.normal.dot(by_duration));
 }
 
+/// Points on no surface have two residuals, one after the other.
+inline void addPull(double weight, const Residual& residual, const ResidualTerms& t, std::vector<PointPull>& pulls) {
+  if (pulls.empty() || pulls.back().point != residual.current) pulls.push_back({residual.current});
+  pulls.back().by_position += weight * t.A * (residual.precision * residual.normal).transpose();
+}
+
 LossDerivatives differentiate(const AlignmentProblem& problem, const RigidMotion& x, const EstimationOptions& options) {
   LossDerivatives out(problem);
+  out.pulls.reserve(problem.pairs().size());
   int block = 0;
   for (const Residual& residual : problem.residuals()) {
     const int beam = problem.current().points.beam[static_cast<std::size_t>(residual.current)];
     const int its_block = beam / options.correlated_beams;
     if (out.blocks.empty() || its_block != block) out.blocks.emplace_back();
     block = its_block;
-    addDerivatives(problem, residual, x, problem.terms(residual, x), out);
+    const ResidualTerms t = problem.terms(residual, x);
+    addDerivatives(problem, residual, x, t, out);
+    addPull(problem.kernel().weight(t.e), residual, t, out.pulls);
   }
   return out;
 }
@@ -256,7 +266,8 @@ std::optional<DisplacementEstimate> estimateDisplacement(const AlignmentProblem&
   z.matching_noise = MatrixDD::Zero(seen.dimension(), seen.dimension());
   z.matching_noise = matchingNoise(z.covariance(), seenCovariance(loss, seen, hessian), loss.blocks.size(),
                                    options.matching_inflation);
-  estimate.decisive = decisivePlace(problem, x, seen, equations.lever, options.place_size);
+  estimate.decisive = decisivePlace(loss.pulls, problem.current().points, loss.squares.information(), seen,
+                                    equations.lever, options.place_size);
   z.matching_noise += placeNoise(z, estimate.decisive, options.place_std);
   estimate.range_offset = rangeOffset(problem, loss, seen);
   estimate.sweep_duration = sweepDuration(loss, seen);

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "sckf_odometry/matching/alignment_problem.h"
 #include "sckf_odometry/matching/observability.h"
+#include "sckf_odometry/matching/surface.h"
 
 namespace sckf {
 
@@ -23,10 +23,19 @@ struct DecisivePlace {
   double share() const;
 };
 
-/// Of all places, points no farther than size [m] from one of them, the one with which the displacement goes farthest,
-/// points and weights as they are in the problem at x; what it does to the yaw counts by the mean lever of the points.
-/// Directions that are not seen do not count. The lever: NormalEquations::lever [m].
-DecisivePlace decisivePlace(const AlignmentProblem& problem, const SE2& x, const ObservableDirections& seen,
-                            double lever, double size);
+/// What the displacement has of one point of the current scan.
+struct PointPull {
+  int point = 0;
+  /// ∂²L/∂x∂p, 3 × 2: of the loss by the displacement and by where the point is, in the reference base_link [1/m²,
+  /// 1/m², 1/m].
+  Eigen::Matrix<double, 3, 2> by_position = Eigen::Matrix<double, 3, 2>::Zero();
+};
+
+/// Of all places, points no farther than size [m] from one of them, the one with which the displacement goes farthest;
+/// what it does to the yaw counts by the mean lever of the points, NormalEquations::lever [m]. Pulls: of the points
+/// that have any, ascending. Information: ∂²L/∂x², which counts in the directions that are seen.
+DecisivePlace decisivePlace(const std::vector<PointPull>& pulls, const ScannedPoints& current,
+                            const Eigen::Matrix3d& information, const ObservableDirections& seen, double lever,
+                            double size);
 
 }  // namespace sckf
