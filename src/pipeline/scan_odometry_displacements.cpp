@@ -65,7 +65,7 @@ bool ScanOdometry::fuse(ScanReport& report) {
   report.outcome = ScanOutcome::kUpdated;
   const Displacement::MatrixDD slack = slackAmongLasers(displacement);
   const auto contradicts = [&] { return report.innovation->nis(slack) > bound; };
-  const bool slipped = contradicts() && looksLikeSlip(report.match);
+  const bool slipped = contradicts() && looksLikeSlip(report);
   if (slipped) {
     allowForSlip();
     report.innovation = filter_->innovation(displacement);
@@ -112,7 +112,7 @@ void ScanOdometry::compareWithOlderReferences(ScanReport& report) {
     const bool placed = laser.failures == 0;
     Match match = matchWithOlder(references_[clone], *report.scan, prediction, placed);
     if (!match.displacement || match.overlap < options.older_min_overlap) continue;
-    if (!placed && !looksLikeSlip(match)) continue;
+    if (!placed && !outweighsWheels(match)) continue;
     Displacement& displacement = *match.displacement;
     displacement.clone = clone;
     displacement.matching_noise += (options.older_inflation - 1.0) * displacement.covariance();
@@ -177,7 +177,16 @@ double ScanOdometry::gate(const Displacement& displacement) const {
   return chiSquared(displacement.dimension(), options_.gate.probability);
 }
 
-bool ScanOdometry::looksLikeSlip(const Match& match) const {
+/// A match worse than is believed against wheels is, too, if the scans refute what these tell: they are wrong then.
+bool ScanOdometry::looksLikeSlip(const ScanReport& report) const {
+  const Match& match = report.match;
+  if (outweighsWheels(match)) return true;
+  return options_.gate.trust_scans_on_slip && matchesWell(match, 0.0) &&
+         matcher_.refutes(references_[match.displacement->clone], *report.scan,
+                          report.prediction.reference_from_current);
+}
+
+bool ScanOdometry::outweighsWheels(const Match& match) const {
   return options_.gate.trust_scans_on_slip && matchesWell(match, options_.gate.slip_min_agreement);
 }
 

@@ -633,5 +633,39 @@ TEST(Failures, EveryReasonHasItsWords) {
   }
 }
 
+/// Thick trunks here and there, from 2 to 14 m away.
+World trees() {
+  World world;
+  for (int k = 0; k < 60; ++k) {
+    const double distance = 2.0 + 0.2 * k;
+    const Eigen::Vector2d trunk(distance * std::cos(2.4 * k), distance * std::sin(2.4 * k));
+    const double angle = 0.7 * k;
+    std::vector<Eigen::Vector2d> corners;
+    for (int corner = 0; corner < 5; ++corner)
+      corners.push_back(trunk +
+                        0.35 * Eigen::Vector2d(std::cos(angle + 1.26 * corner), std::sin(angle + 1.26 * corner)));
+    world = withPolygon(std::move(world), corners);
+  }
+  return world;
+}
+
+TEST(Refutes, WhereScansCannotLieSo) {
+  SimulatedLaser ahead;
+  ahead.beams = 181;
+  ahead.angle_min = -M_PI_2;
+  ahead.angle_increment = M_PI / 180.0;
+  std::mt19937_64 random(1);
+  const auto at = [&](const SE2& pose) { return prepare(simulateScan(trees(), pose, ahead, &random), ahead); };
+  const SE2 turned(0.0, 0.0, 0.3);
+  const ScanMatcher matcher{MatcherOptions()};
+  const auto reference = at(SE2());
+  const auto current = at(turned);
+  EXPECT_FALSE(matcher.refutes(*reference, *current, turned)) << "where they truly lie";
+  EXPECT_FALSE(matcher.refutes(*reference, *current, corrected(turned, {0.05, 0.0, 0.01}))) << "or nearly";
+  EXPECT_TRUE(matcher.refutes(*reference, *current, SE2())) << "as wheels tell that do not turn";
+  const SE2 back(0.0, 0.0, M_PI);
+  EXPECT_FALSE(matcher.refutes(*reference, *at(back), back)) << "who has turned round sees other trees";
+}
+
 }  // namespace
 }  // namespace sckf::test

@@ -138,7 +138,8 @@ class ScanOdometry {
   void claimLandmarks(ScanReport& report);
   void useLandmarks(ScanReport& report);
   double gate(const Displacement& displacement) const;  ///< a larger innovation, normalised and squared, contradicts
-  bool looksLikeSlip(const Match& match) const;
+  bool looksLikeSlip(const ScanReport& report) const;
+  bool outweighsWheels(const Match& match) const;
   bool matchesWell(const Match& match, double min_agreement) const;
   ScanMotion motionDuring(const WaitingScans::Entry& waiting) const;
   EvenSweep evenSweep(const WaitingScans::Entry& waiting) const;
