@@ -320,9 +320,9 @@ std::optional<Arguments> parse(int argc, char** argv) {
 Options optionsFor(const Arguments& arguments) {
   Options options;
   if (!arguments.params.empty()) {
-    std::vector<std::string> unknown;
-    options = sckf::readOptions(ParameterFile(arguments.params), &unknown);
-    for (const std::string& name : unknown) std::cerr << arguments.params << ": there is no parameter " << name << "\n";
+    std::vector<std::string> remarks;
+    options = sckf::readOptions(ParameterFile(arguments.params), &remarks);
+    for (const std::string& remark : remarks) std::cerr << arguments.params << ": " << remark << "\n";
   }
   if (!arguments.method.empty()) options.pipeline.method = arguments.method;
   if (!arguments.scan_topics.empty()) options.node.scan_topics = arguments.scan_topics;
