@@ -1,4 +1,5 @@
 // How a scan corrects the estimate: by displacements from references, by landmarks, by a heading.
+#include <Eigen/LU>
 #include <algorithm>
 #include <sstream>
 
@@ -137,13 +138,17 @@ Match ScanOdometry::matchWithOlder(const PreparedScan& reference, const Prepared
 }
 
 /// What matches err by beyond range noise is partly the same from reference to reference, as the same surfaces are
-/// taken wrong in each: it adds up faster than errors that have nothing in common.
+/// taken wrong in each: it adds up faster than errors that have nothing in common. Only so much of it is in the pose as
+/// the update has taken over from the displacement: nothing where the wheels know better.
 void ScanOdometry::allowForCommonErrors(const ScanReport& report) {
   if (!wasUsed(report.outcome) || !report.match.displacement) return;
   const Displacement& z = *report.match.displacement;
-  Displacement::Matrix3D seen = z.fromObservable();
-  seen.topRows<2>() = (z.reference_from_current.rotation().transpose() * seen.topRows<2>()).eval();
-  filter_->loosen(options_.reference.matching_common * symmetric(seen * z.matching_noise * seen.transpose()));
+  const Displacement::MatrixDD gain = Displacement::MatrixDD::Identity(z.dimension(), z.dimension()) -
+                                      z.covariance() * report.innovation->covariance.inverse();
+  Displacement::Matrix3D taken_over = z.fromObservable() * gain;
+  taken_over.topRows<2>() = (z.reference_from_current.rotation().transpose() * taken_over.topRows<2>()).eval();
+  filter_->loosen(options_.reference.matching_common *
+                  symmetric(taken_over * z.matching_noise * taken_over.transpose()));
 }
 
 /// Another laser may have corrected the estimate just now, by a displacement whose covariance has tails.

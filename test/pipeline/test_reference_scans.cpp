@@ -174,13 +174,14 @@ TEST(ScanOdometry, WhatDisplacementsHaveInCommonIsAllowedFor) {
 }
 
 /// By how much larger the variance of y is after a drive when so much of the matching noise is common.
-double grownByWhatIsCommon(const World& world) {
-  const SimulatedDrive drive(Wheels(), 11000, world);
+double grownByWhatIsCommon(const World& world, const Wheels& wheels = {}, const OdometryNoise& noise = {}) {
+  const SimulatedDrive drive(wheels, 11000, world);
   double variance[2];
   for (const bool common : {false, true}) {
     PipelineOptions options;
     options.reference.older_compared = 0;
     options.reference.matching_common = common ? 1.0 : 0.0;
+    options.odometry_noise = noise;
     Driven driven(drive, options);
     driven.odometry(0);
     driven.run(0, 10000);
@@ -197,6 +198,16 @@ TEST(ScanOdometry, WhatMatchesOneAfterTheOtherErrByAlikeAddsUp) {
   EXPECT_LT(among_rough_walls, 2.1);
   EXPECT_LT(among_smooth_walls, 1.2);
   EXPECT_GE(among_smooth_walls, 1.0);
+}
+
+/// What the estimate does not take over from a displacement it does not err by either.
+TEST(ScanOdometry, WhatMatchesErrByDoesNotMatterWhereTheWheelsKnowBetter) {
+  Wheels good;
+  good.scale = 1.0;
+  good.yaw_per_meter = 0.0;
+  const double with_good_wheels = grownByWhatIsCommon(rough(room(), 0.08), good, {0.001, 0.001, 0.001, 0.001});
+  EXPECT_GE(with_good_wheels, 1.0);
+  EXPECT_LT(with_good_wheels, 1.1);
 }
 
 }  // namespace
