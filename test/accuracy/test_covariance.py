@@ -15,6 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "test" / "tools")]
 from logs import recorded, simulated  # noqa: E402
 from script_case import ScriptCase  # noqa: E402
+from simulated_log import simulate  # noqa: E402
 
 EXACT = ("--reference-std", "0", "0")  # of a simulation
 
@@ -48,6 +49,11 @@ class OnLogs(ScriptCase):
         bag, tum = simulated(Path(self.folder.name))
         self.check("simulated", bag, tum, bound, *EXACT)
 
+    def check_place(self, place: str, wheels: str, bound: Found) -> None:
+        bag, tum = Path(self.path("place.bag")), Path(self.path("place.tum"))
+        simulate(place, bag, tum, wheels)
+        self.check(f"{place}, wheels {wheels}", bag, tum, bound, *EXACT)
+
 
 class DisplacementsTest(OnLogs):
     """Inside: below the 99 % bound of chi squared."""
@@ -66,6 +72,10 @@ class DisplacementsTest(OnLogs):
     def test_simulated_log_of_mrpt(self) -> None:
         self.check_simulated(Found(1.9, 0.955))
 
+    def test_simulated_places(self) -> None:
+        self.check_place("museum", "drifting", Found(1.4, 0.985))
+        self.check_place("campus", "good", Found(1.3, 0.985))
+
 
 class WindowsTest(OnLogs):
     """20 m from a pose that is known. Inside: of three sigma, in the worst of x, y and yaw."""
@@ -83,6 +93,11 @@ class WindowsTest(OnLogs):
 
     def test_simulated_log_of_mrpt(self) -> None:
         self.check_simulated(Found(2.7, 0.98))
+
+    def test_simulated_places(self) -> None:
+        """Where wheels err in the way, and scans see little of it, and where few beams see anything."""
+        self.check_place("corridor", "drifting", Found(2.37, 0.98))
+        self.check_place("campus", "drifting", Found(2.37, 0.98))
 
 
 class WhitenessTest(ScriptCase):

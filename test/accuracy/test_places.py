@@ -1,0 +1,91 @@
+#!/usr/bin/python3
+"""Simulated places, of which the truth is known exactly, by default: how far the estimate drifts, beside what is allowed.
+
+Each is hard in its own way; see simulated_places.py. Run with -s (pytest) or as it is to see the figures.
+"""
+from __future__ import annotations
+
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+from typing import Optional
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "scripts"))
+from logs import run  # noqa: E402
+from simulated_log import Laser, simulate  # noqa: E402
+from trajectory import Drift, drift, read_tum  # noqa: E402
+
+COVERAGE = 0.98  # share of the scans that the estimate must cover
+
+
+class PlacesTest(unittest.TestCase):
+    folder: tempfile.TemporaryDirectory[str]
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.folder = tempfile.TemporaryDirectory()
+
+    @classmethod
+    def tearDownClass(cls) -> None:
+        cls.folder.cleanup()
+
+    def path(self, name: str) -> Path:
+        return Path(self.folder.name) / name
+
+    def simulate(self, place: str, wheels: str = "good", laser: Laser = Laser(), step: float = 0.5,
+                 somebody: Optional[str] = None) -> None:
+        simulate(place, self.path("log.bag"), self.path("log.tum"), wheels, step, laser, somebody)
+
+    def drifted(self, *options: str | Path) -> Drift:
+        run("replay", self.path("log.bag"), "--trajectory", self.path("estimate.tum"), *options)
+        result = drift(read_tum(self.path("log.tum")), read_tum(self.path("estimate.tum")))
+        self.assertGreaterEqual(result.covered, COVERAGE * result.reference_poses)
+        return result
+
+    def check(self, place: str, wheels: str, percent: float, deg_per_m: float, of_wheels: float) -> None:
+        """The most that the estimate may drift, and the least that the wheels alone do."""
+        self.simulate(place, wheels)
+        estimate, alone = self.drifted(), self.drifted("--method", "dead_reckoning")
+        said = (f"{place}, wheels {wheels}: {estimate.translation_percent:.2f} %, {estimate.rotation_deg_per_m:.4f} °/m (at most "
+                f"{percent}, {deg_per_m}); wheels alone {alone.translation_percent:.2f} %")
+        print("\n" + said)
+        self.assertLessEqual(estimate.translation_percent, percent, said)
+        self.assertLessEqual(estimate.rotation_deg_per_m, deg_per_m, said)
+        self.assertGreaterEqual(alone.translation_percent, of_wheels, said)
+
+    def test_a_corridor_with_doors(self) -> None:
+        self.check("corridor", "drifting", 0.7, 0.008, 30.0)
+
+    def test_a_hotel_whose_doors_are_one_as_the_other(self) -> None:
+        self.check("hotel", "slipping", 0.37, 0.006, 12.0)
+
+    def test_two_bare_walls(self) -> None:
+        self.check("bare", "freezing", 0.45, 0.005, 12.0)
+
+    def test_a_museum_in_which_people_stroll(self) -> None:
+        self.check("museum", "freezing", 0.14, 0.005, 40.0)
+
+    def test_a_castle_of_rough_stone(self) -> None:
+        self.check("castle", "slipping", 0.17, 0.008, 12.0)
+
+    def test_a_campus_of_trees(self) -> None:
+        self.check("campus", "drifting", 0.4, 0.01, 25.0)
+
+    def test_wheels_that_freeze_where_the_laser_sees_little(self) -> None:
+        """Scans that agree badly place the robot where they refute what the wheels tell."""
+        self.check("campus", "freezing", 1.7, 0.08, 15.0)
+
+    def test_somebody_who_walks_before_the_robot_does_not_hold_it(self) -> None:
+        self.simulate("bare", step=0.2, laser=Laser(beams=361, reach=12.0), somebody="ahead")
+        estimate = self.drifted().translation_percent
+        self.path("held.yaml").write_text("moved_place_min_share: 0\n", encoding="utf-8")
+        held = self.drifted("--params", self.path("held.yaml")).translation_percent
+        print(f"\nsomebody ahead between bare walls: {estimate:.2f} %, if no place is left out {held:.2f} %")
+        self.assertLess(estimate, 1.3)
+        self.assertGreater(held, 5.0 * estimate)
+
+
+if __name__ == "__main__":
+    unittest.main()
