@@ -21,26 +21,19 @@ COVERAGE = 0.98  # share of the scans that the estimate must cover
 
 
 class PlacesTest(unittest.TestCase):
-    folder: tempfile.TemporaryDirectory[str]
 
-    @classmethod
-    def setUpClass(cls) -> None:
-        cls.folder = tempfile.TemporaryDirectory()
-
-    @classmethod
-    def tearDownClass(cls) -> None:
-        cls.folder.cleanup()
-
-    def path(self, name: str) -> Path:
-        return Path(self.folder.name) / name
+    def setUp(self) -> None:
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
 
     def simulate(self, place: str, wheels: str = "good", laser: Laser = Laser(), step: float = 0.5,
                  somebody: Optional[str] = None) -> None:
-        simulate(place, self.path("log.bag"), self.path("log.tum"), wheels, step, laser, somebody)
+        simulate(place, self.folder / "log.bag", self.folder / "log.tum", wheels, step, laser, somebody)
 
     def drifted(self, *options: str | Path) -> Drift:
-        run("replay", self.path("log.bag"), "--trajectory", self.path("estimate.tum"), *options)
-        result = drift(read_tum(self.path("log.tum")), read_tum(self.path("estimate.tum")))
+        run("replay", self.folder / "log.bag", "--trajectory", self.folder / "estimate.tum", *options)
+        result = drift(read_tum(self.folder / "log.tum"), read_tum(self.folder / "estimate.tum"))
         self.assertGreaterEqual(result.covered, COVERAGE * result.reference_poses)
         return result
 
@@ -80,8 +73,8 @@ class PlacesTest(unittest.TestCase):
     def test_somebody_who_walks_before_the_robot_does_not_hold_it(self) -> None:
         self.simulate("bare", step=0.2, laser=Laser(beams=361, reach=12.0), somebody="ahead")
         estimate = self.drifted().translation_percent
-        self.path("held.yaml").write_text("moved_place_min_share: 0\n", encoding="utf-8")
-        held = self.drifted("--params", self.path("held.yaml")).translation_percent
+        (self.folder / "held.yaml").write_text("moved_place_min_share: 0\n", encoding="utf-8")
+        held = self.drifted("--params", self.folder / "held.yaml").translation_percent
         print(f"\nsomebody ahead between bare walls: {estimate:.2f} %, if no place is left out {held:.2f} %")
         self.assertLess(estimate, 1.3)
         self.assertGreater(held, 5.0 * estimate)
