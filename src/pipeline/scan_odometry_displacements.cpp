@@ -143,9 +143,9 @@ Match ScanOdometry::matchWithOlder(const PreparedScan& reference, const Prepared
 void ScanOdometry::allowForCommonErrors(const ScanReport& report) {
   if (!wasUsed(report.outcome) || !report.match.displacement) return;
   const Displacement& z = *report.match.displacement;
-  const Displacement::MatrixDD gain = Displacement::MatrixDD::Identity(z.dimension(), z.dimension()) -
-                                      z.covariance() * report.innovation->covariance.inverse();
-  Displacement::Matrix3D taken_over = z.fromObservable() * gain;
+  const Displacement::MatrixDD share = Displacement::MatrixDD::Identity(z.dimension(), z.dimension()) -
+                                       z.covariance() * report.innovation->covariance.inverse();
+  Displacement::Matrix3D taken_over = z.fromObservable() * share;
   taken_over.topRows<2>() = (z.reference_from_current.rotation().transpose() * taken_over.topRows<2>()).eval();
   filter_->loosen(options_.reference.matching_common *
                   symmetric(taken_over * z.matching_noise * taken_over.transpose()));
@@ -182,7 +182,7 @@ double ScanOdometry::gate(const Displacement& displacement) const {
   return chiSquared(displacement.dimension(), options_.gate.probability);
 }
 
-/// A match worse than is believed against wheels is, too, if the scans refute what these tell: they are wrong then.
+/// Where the scans refute what the wheels tell these are wrong, and any match will do that fits as well otherwise.
 bool ScanOdometry::looksLikeSlip(const ScanReport& report) const {
   const Match& match = report.match;
   if (outweighsWheels(match)) return true;

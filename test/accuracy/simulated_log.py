@@ -11,7 +11,7 @@ import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import List, Optional
+from typing import Callable, Dict, List, Optional
 
 import numpy as np
 import rosbag
@@ -38,14 +38,14 @@ class Wheels:
     pull: float = 0.0  # [rad/m] told too much
     noise: float = 0.01  # of the way
     yaw_noise: float = 0.002  # [rad/√m]
+    worse: Optional[Callable[[np.ndarray], np.ndarray]] = None  # of what they would tell of the steps, what they do
 
 
-GOOD = Wheels()
-WHEELS = {
-    "good": (GOOD, lambda steps: steps),
-    "drifting": (Wheels(1.05, 1.03, math.radians(2.0), 0.03, 0.01), lambda steps: steps),
-    "slipping": (GOOD, slipping),
-    "freezing": (GOOD, freezing),
+WHEELS: Dict[str, Wheels] = {
+    "good": Wheels(),
+    "drifting": Wheels(1.05, 1.03, math.radians(2.0), 0.03, 0.01),
+    "slipping": Wheels(worse=slipping),
+    "freezing": Wheels(worse=freezing),
 }
 
 
@@ -81,16 +81,16 @@ def drive(way: np.ndarray, step: float) -> np.ndarray:
     return np.concatenate(poses)
 
 
-def told_by_wheels(poses: np.ndarray, name: str, draws: np.random.Generator) -> np.ndarray:
+def told_by(wheels: Wheels, poses: np.ndarray, draws: np.random.Generator) -> np.ndarray:
     """Poses of the odometry at the same times, from the origin on."""
-    wheels, worse = WHEELS[name]
     steps = between(poses[:-1], poses[1:])
     way = np.hypot(steps[:, 0], steps[:, 1])
     yaw_std = wheels.yaw_noise * np.sqrt(way) + 0.01 * abs(steps[:, 2])
     noise = draws.normal(size=steps.shape) * np.column_stack((wheels.noise * way, 0.3 * wheels.noise * way, yaw_std))
     drift = np.column_stack((np.zeros((len(steps), 2)), wheels.pull * way))
+    steps = steps * np.array([wheels.way, wheels.way, wheels.rotation]) + drift + noise
     told = [np.zeros(3)]
-    for step in worse(steps * np.array([wheels.way, wheels.way, wheels.rotation]) + drift + noise):
+    for step in wheels.worse(steps) if wheels.worse else steps:
         told.append(compose(told[-1], step))
     return np.array(told)
 
@@ -104,10 +104,10 @@ def legs(at: np.ndarray, stride: float) -> np.ndarray:
 class Somebody:
     """Walks along the robot's way for 25 s of each minute, 0.4 m to the left of it: ahead, at its speed, or towards it."""
 
-    def __init__(self, which: Optional[str], poses: np.ndarray):
+    def __init__(self, which: Optional[str], truth: Trajectory):
         self.which = which
-        self.poses = poses
-        self.way = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))))
+        self.poses = truth.poses
+        self.way = truth.way
 
     def seen(self, k: int, time: float) -> np.ndarray:
         since = time % 60.0
@@ -148,14 +148,14 @@ def simulate(place_name: str, bag: Path, tum: Path, wheels: str = "good", step: 
     draws = np.random.default_rng(7)
     place = PLACES[place_name](draws)
     poses = drive(place.way, step)
-    odometry = told_by_wheels(poses, wheels, draws)
-    stamps = START + step / SPEED * np.arange(len(poses))
+    truth = Trajectory(START + step / SPEED * np.arange(len(poses)), poses)
+    odometry = told_by(WHEELS[wheels], poses, draws)
     strollers = draws.uniform(place.way.min(axis=0) - 3.0, place.way.max(axis=0) + 3.0, (place.strollers, 2))
-    walker = Somebody(somebody, poses)
+    walker = Somebody(somebody, truth)
     with rosbag.Bag(str(bag), "w") as out:
         begin = rospy.Time.from_sec(START)
         out.write("/tf_static", mount_message(begin, MOUNT), begin)
-        for k, (stamp, pose) in enumerate(zip(stamps, poses)):
+        for k, (stamp, pose) in enumerate(zip(truth.stamps, poses)):
             time = rospy.Time.from_sec(stamp)
             strollers += draws.normal(0.0, 0.3, strollers.shape)
             near = [legs(np.array([*at, 0.0]), 0.1) for at in strollers if 0.7 < math.hypot(*(at - pose[:2])) < 15.0]
@@ -167,7 +167,7 @@ def simulate(place_name: str, bag: Path, tum: Path, wheels: str = "good", step: 
             for j in range(ODOMETRY if k + 1 < len(poses) else 1):
                 time = rospy.Time.from_sec(stamp + j / ODOMETRY * step / SPEED)
                 out.write("/odom", odometry_message(time, compose(odometry[k], j / ODOMETRY * step_told)), time)
-    write_tum(tum, Trajectory(stamps, poses))
+    write_tum(tum, truth)
 
 
 def main() -> None:

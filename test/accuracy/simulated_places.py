@@ -2,10 +2,15 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Callable, Dict, Sequence
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "ros"))
+from simulated_bag import polygon  # noqa: E402
 
 
 @dataclass(frozen=True)
@@ -15,11 +20,6 @@ class Place:
     way: np.ndarray
     strollers: int = 0  # people who walk about
     outdoors: bool = False  # beams get lost, or meet the ground
-
-
-def polygon(corners: Sequence[Sequence[float]] | np.ndarray) -> np.ndarray:
-    begins = np.asarray(corners, dtype=float)
-    return np.stack((begins, np.roll(begins, -1, axis=0)), axis=1)
 
 
 def disc(centre: Sequence[float], radius: float, sides: int = 8) -> np.ndarray:

@@ -32,12 +32,15 @@ OUTLINES = [
 ]
 
 
+def polygon(corners):
+    """Its segments, n × 2 × 2."""
+    begins = np.asarray(corners, dtype=float)
+    return np.stack((begins, np.roll(begins, -1, axis=0)), axis=1)
+
+
 def walls():
     """All segments, n × 2 × 2."""
-    segments = []
-    for outline in OUTLINES:
-        segments += [(a, b) for a, b in zip(outline, outline[1:] + outline[:1])]
-    return np.array(segments, dtype=float)
+    return np.concatenate([polygon(outline) for outline in OUTLINES])
 
 
 class Mount:
