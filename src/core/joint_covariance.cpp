@@ -28,10 +28,6 @@ Eigen::Matrix3d leverCorrection(const Innovation& innovation) {
 
 double Innovation::nis() const { return residual.dot(covariance.llt().solve(residual)); }
 
-double Innovation::nis(const MatrixDD& slack) const {
-  return residual.dot(MatrixDD(covariance + slack).llt().solve(residual));
-}
-
 JointCovariance::JointCovariance(const Eigen::Matrix3d& pose_covariance)
     : P_kk_(pose_covariance),
       P_kX_(pose_covariance),

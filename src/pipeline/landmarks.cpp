@@ -24,14 +24,6 @@ double stdOf(const Innovation& r) {
   return r.covariance.rows() == 3 ? largestStd(r.covariance.topLeftCorner<2, 2>()) : std::sqrt(r.covariance(0, 0));
 }
 
-/// What the robot's pose may be off, as an error of what it sees there.
-Displacement::MatrixDD seenFrom(const Eigen::Matrix3d& slack, const Sighting& sighting) {
-  Eigen::Matrix3d J = Eigen::Matrix3d::Identity();
-  J.topRightCorner<2, 1>() = quarterTurn(sighting.base_from_landmark.translation());
-  const Displacement::MatrixD3 S = sighting.seen() * J;
-  return S * slack * S.transpose();
-}
-
 /// Volume of the ellipsoid of what is seen, squared.
 double uncertainty(const Sighting& sighting) {
   const Displacement::MatrixD3 S = sighting.seen();
@@ -46,31 +38,29 @@ const std::vector<std::string>& landmarkUses() {
 }
 
 std::shared_ptr<const PreparedScan> Landmarks::claim(std::shared_ptr<const PreparedScan> scan,
-                                                     const LandmarkStates& filter, const ReferenceOptions& reference,
-                                                     const SurfaceOptions& surface) {
+                                                     const LandmarkStates& filter, const SurfaceOptions& surface) {
   ++scans_;
   scan_ = std::move(scan);
   sights_.clear();
   std::vector<bool> aside(scan_->size(), false);
   if (options_.corners()) {
     for (const Corner& corner : findCorners(*scan_, options_.corner)) sights_.emplace_back(corner);
-    claim(0, filter, reference, aside);
+    claim(0, filter, aside);
   }
   // Corners come first: they tell all that lines tell, and where along the lines, too.
   corners_have_ = aside;
   if (options_.lines()) {
     const std::size_t corners = sights_.size();
     for (const Line& line : findLines(*scan_, aside, options_.line)) sights_.emplace_back(line);
-    claim(corners, filter, reference, aside);
+    claim(corners, filter, aside);
   }
   if (std::find(aside.begin(), aside.end(), true) == aside.end()) return scan_;
   return setAside(*scan_, aside, surface);
 }
 
 /// Of the sights from `first` on those that are, or may become, landmarks; their points are aside then.
-void Landmarks::claim(std::size_t first, const LandmarkStates& filter, const ReferenceOptions& reference,
-                      std::vector<bool>& aside) {
-  for (const Association& a : compatible(filter, reference, Stage::kClaim)) {
+void Landmarks::claim(std::size_t first, const LandmarkStates& filter, std::vector<bool>& aside) {
+  for (const Association& a : compatible(filter, Stage::kClaim)) {
     if (a.sight >= first) sights_[a.sight].claimed = true;
   }
   for (std::size_t s = first; s < sights_.size(); ++s) {
@@ -103,14 +93,14 @@ void Landmarks::giveWay(std::size_t first, double left) {
   }
 }
 
-int Landmarks::update(LandmarkStates& filter, const ReferenceOptions& reference) {
+int Landmarks::update(LandmarkStates& filter) {
   // The most certain first: it makes the others more certain.
-  for (auto all = compatible(filter, reference, Stage::kUpdate); const Association* next = mostCertain(all, filter);
-       all = compatible(filter, reference, Stage::kUpdate)) {
+  for (auto all = compatible(filter, Stage::kUpdate); const Association* next = mostCertain(all, filter);
+       all = compatible(filter, Stage::kUpdate)) {
     use(*next, filter);
   }
   const auto used = std::count_if(known_.begin(), known_.end(), [this](const Known& k) { return k.seen == scans_; });
-  giveUpMissed(filter, reference);
+  giveUpMissed(filter);
   beginNew(filter);
   return static_cast<int>(used);
 }
@@ -126,18 +116,8 @@ void Landmarks::use(const Association& association, LandmarkStates& filter) {
   }
   sight.used = true;
   known.farthest = std::max(known.farthest, sight.farthest());
-  known.misses = known.references = 0;
+  known.misses = 0;
   known.seen = scans_;
-}
-
-void Landmarks::countReference() {
-  for (Known& known : known_) ++known.references;
-}
-
-/// By how much the robot may be off from where the landmark was last seen, beyond the filter's covariance.
-Eigen::Matrix3d Landmarks::slackOf(const Known& known, const ReferenceOptions& reference) {
-  if (known.references == 0) return Eigen::Matrix3d::Zero();
-  return referenceSlack(static_cast<std::size_t>(known.references), reference);
 }
 
 bool Landmarks::isOf(Stage stage, const Sight& sight) {
@@ -148,14 +128,12 @@ bool Landmarks::isOf(Stage stage, const Sight& sight) {
 /// Of what is seen and of landmarks that are free yet, those that may belong together. What is claimed before the
 /// displacement, at a pose that only the wheels tell, is looked at again after it. Of a line a scan may see several
 /// pieces.
-std::vector<Landmarks::Association> Landmarks::compatible(const LandmarkStates& filter,
-                                                          const ReferenceOptions& reference, Stage stage) const {
+std::vector<Landmarks::Association> Landmarks::compatible(const LandmarkStates& filter, Stage stage) const {
   const double farthest = 4.0 * options_.max_std;
   std::vector<Association> all;
   for (std::size_t l = 0; l < known_.size(); ++l) {
     if (known_[l].seen == scans_ && !known_[l].shape.is_line) continue;
     const Feature expected = moved(inverse(filter.pose()), landmark(l, filter));
-    const Eigen::Matrix3d slack = slackOf(known_[l], reference);
     for (std::size_t s = 0; s < sights_.size(); ++s) {
       const Sight& sight = sights_[s];
       if (!isOf(stage, sight) || !areOfAKind(expected, sight.feature())) continue;
@@ -164,7 +142,7 @@ std::vector<Landmarks::Association> Landmarks::compatible(const LandmarkStates& 
       const double std = stdOf(r);
       const bool is_certain = stage != Stage::kUpdate || std <= options_.max_std;
       const double bound = chiSquared(r.residual.size(), options_.probability);
-      if (is_certain && r.nis(seenFrom(slack, sight.sighting)) <= bound) all.push_back({s, l, std});
+      if (is_certain && r.nis() <= bound) all.push_back({s, l, std});
     }
   }
   return all;
@@ -210,9 +188,9 @@ void Landmarks::giveUp(std::size_t landmark, LandmarkStates& filter) {
   known_.erase(known_.begin() + static_cast<std::ptrdiff_t>(landmark));
 }
 
-void Landmarks::giveUpMissed(LandmarkStates& filter, const ReferenceOptions& reference) {
+void Landmarks::giveUpMissed(LandmarkStates& filter) {
   std::vector<bool> excused(known_.size(), false);
-  for (const Association& a : compatible(filter, reference, Stage::kExcuse)) excused[a.landmark] = true;
+  for (const Association& a : compatible(filter, Stage::kExcuse)) excused[a.landmark] = true;
   for (std::size_t l = known_.size(); l-- > 0;) {
     Known& known = known_[l];
     if (known.seen == scans_ || excused[l]) continue;
@@ -244,7 +222,7 @@ void Landmarks::beginNew(LandmarkStates& filter) {
     }
     candidates_.erase(candidates_.begin() + (candidate - candidates_.data()));
     filter.addLandmark(sight.sighting);
-    known_.push_back({sight.shape, sight.farthest(), 0, 0, scans_});
+    known_.push_back({sight.shape, sight.farthest(), 0, scans_});
   }
   const auto is_forgotten = [this](const Candidate& candidate) { return candidate.seen + kForgotten < scans_; };
   candidates_.erase(std::remove_if(candidates_.begin(), candidates_.end(), is_forgotten), candidates_.end());

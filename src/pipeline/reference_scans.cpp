@@ -61,15 +61,4 @@ std::vector<std::size_t> ReferenceScans::worthComparing(std::size_t laser, const
   return clones;
 }
 
-Eigen::Matrix3d ReferenceScans::slack(std::size_t clone, const ReferenceOptions& options) const {
-  const auto is_of_laser = [&](const Reference& r) { return r.laser == references_[clone].laser; };
-  const auto end = references_.begin() + static_cast<std::ptrdiff_t>(clone) + 1;
-  return referenceSlack(static_cast<std::size_t>(std::count_if(references_.begin(), end, is_of_laser)), options);
-}
-
-Eigen::Matrix3d referenceSlack(std::size_t references, const ReferenceOptions& options) {
-  const Eigen::Vector3d std(options.older_std_translation, options.older_std_translation, options.older_std_yaw);
-  return (static_cast<double>(references) * std.cwiseAbs2()).asDiagonal();
-}
-
 }  // namespace sckf

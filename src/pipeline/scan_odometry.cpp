@@ -172,7 +172,6 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
     allowForCommonErrors(report);
     filter_->clone(report.scan->rangeVariances());  // (24)-(27)
     references_.add(report.scan, report.laser, options_.reference.kept, *filter_);
-    landmarks_.countReference();
   }
   report.estimate = estimate();
   report.in_map = inMap();

@@ -64,8 +64,7 @@ bool ScanOdometry::fuse(ScanReport& report) {
     return false;
   }
   report.outcome = ScanOutcome::kUpdated;
-  const Displacement::MatrixDD slack = slackAmongLasers(displacement);
-  const auto contradicts = [&] { return report.innovation->nis(slack) > bound; };
+  const auto contradicts = [&] { return report.innovation->nis() > bound; };
   const bool slipped = contradicts() && looksLikeSlip(report);
   if (slipped) {
     allowForSlip();
@@ -107,9 +106,7 @@ void ScanOdometry::compareWithOlderReferences(ScanReport& report) {
   const ReferenceOptions& options = options_.reference;
   Laser& laser = lasers_[report.laser];
   for (const std::size_t clone : references_.worthComparing(report.laser, *filter_, options)) {
-    DisplacementPrediction prediction = filter_->predictedDisplacementFrom(clone);
-    const Eigen::Matrix3d slack = references_.slack(clone, options);
-    prediction.covariance += slack;
+    const DisplacementPrediction prediction = filter_->predictedDisplacementFrom(clone);
     const bool placed = laser.failures == 0;
     Match match = matchWithOlder(references_[clone], *report.scan, prediction, placed);
     if (!match.displacement || match.overlap < options.older_min_overlap) continue;
@@ -118,8 +115,7 @@ void ScanOdometry::compareWithOlderReferences(ScanReport& report) {
     displacement.clone = clone;
     displacement.matching_noise += (options.older_inflation - 1.0) * displacement.covariance();
     const Innovation innovation = filter_->innovation(displacement);
-    if (innovation.nis(displacement.observable * slack * displacement.observable.transpose()) > gate(displacement))
-      continue;
+    if (innovation.nis() > gate(displacement)) continue;
     filter_->update(displacement, innovation);
     ++report.older_references;
     laser.failures = 0;
@@ -151,13 +147,6 @@ void ScanOdometry::allowForCommonErrors(const ScanReport& report) {
                   symmetric(taken_over * z.matching_noise * taken_over.transpose()));
 }
 
-/// Another laser may have corrected the estimate just now, by a displacement whose covariance has tails.
-Displacement::MatrixDD ScanOdometry::slackAmongLasers(const Displacement& displacement) const {
-  if (options_.lasers == 1) return Displacement::MatrixDD::Zero(displacement.dimension(), displacement.dimension());
-  const Eigen::Matrix3d slack = references_.slack(displacement.clone, options_.reference);
-  return displacement.observable * slack * displacement.observable.transpose();
-}
-
 LandmarkStates* ScanOdometry::landmarkFilter() const {
   return options_.landmarks.on() ? dynamic_cast<LandmarkStates*>(filter_.get()) : nullptr;
 }
@@ -165,13 +154,13 @@ LandmarkStates* ScanOdometry::landmarkFilter() const {
 void ScanOdometry::claimLandmarks(ScanReport& report) {
   const LandmarkStates* filter = landmarkFilter();
   if (filter == nullptr) return;
-  report.scan = landmarks_.claim(report.scan, *filter, options_.reference, options_.scan.surface);
+  report.scan = landmarks_.claim(report.scan, *filter, options_.scan.surface);
 }
 
 void ScanOdometry::useLandmarks(ScanReport& report) {
   LandmarkStates* filter = landmarkFilter();
   if (filter == nullptr) return;
-  report.landmarks_used = landmarks_.update(*filter, options_.reference);
+  report.landmarks_used = landmarks_.update(*filter);
   report.landmarks = landmarks_.views(*filter);
   if (!options_.landmarks.only || report.new_reference) return;
   report.outcome = report.landmarks_used > 0 ? ScanOutcome::kUpdated : ScanOutcome::kNoMatch;

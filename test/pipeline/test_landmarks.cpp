@@ -228,13 +228,13 @@ int usedAt(const SE2& truth, const SE2& believed, const Eigen::Vector3d& std) {
   Landmarks landmarks(options);
   MultiCloneFilter filter(SE2(), 1e-8 * Eigen::Matrix3d::Identity());
   for (int i = 0; i < 4; ++i) {
-    landmarks.claim(scanOf(posts(), SE2()), filter, ReferenceOptions(), SurfaceOptions());
-    landmarks.update(filter, ReferenceOptions());
+    landmarks.claim(scanOf(posts(), SE2()), filter, SurfaceOptions());
+    landmarks.update(filter);
   }
   EXPECT_GE(filter.landmarks(), 4U);
   filter.propagate({believed, std.cwiseAbs2().asDiagonal()});
-  landmarks.claim(scanOf(posts(), truth), filter, ReferenceOptions(), SurfaceOptions());
-  const int used = landmarks.update(filter, ReferenceOptions());
+  landmarks.claim(scanOf(posts(), truth), filter, SurfaceOptions());
+  const int used = landmarks.update(filter);
   if (used > 0) {
     EXPECT_LT(error(filter.pose(), truth).head<2>().norm(), 0.1);
   }

@@ -23,8 +23,8 @@ class Watcher {
     laser.beams = 1441;
     laser.angle_increment = 2.0 * M_PI / 1441.0;
     const auto scan = prepareScan(simulateScan(world, truth, laser), Eigen::Isometry3d::Identity(), ScanOptions());
-    rest_ = landmarks_.claim(scan, filter_, ReferenceOptions(), SurfaceOptions());
-    return landmarks_.update(filter_, ReferenceOptions());
+    rest_ = landmarks_.claim(scan, filter_, SurfaceOptions());
+    return landmarks_.update(filter_);
   }
   int see(const World& world, int times) {
     int used = 0;

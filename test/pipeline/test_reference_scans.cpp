@@ -1,7 +1,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/matrix_matchers.h"
 #include "pipeline/simulated_drive.h"
 #include "sckf_odometry/core/multi_clone_filter.h"
 #include "sckf_odometry/core/stochastic_cloning_filter.h"
@@ -115,19 +114,6 @@ TEST(ReferenceScans, LasersHaveTheirOwn) {
   EXPECT_NEAR(filter.clonedPose(4).x, 0.1, 1e-9) << "that of the second laser outlives older ones of the first";
   EXPECT_THAT(way.scans.worthComparing(0, filter, limits(9)), ElementsAre(1U, 2U));
   EXPECT_THAT(way.scans.worthComparing(1, filter, limits(9)), ElementsAre(4U));
-  ReferenceOptions options;
-  EXPECT_TRUE(matricesNear(way.scans.slack(4, options), way.scans.slack(1, options), 1e-15)) << "each the second";
-}
-
-TEST(ReferenceScans, SlackGrowsWithTheReferencesInBetween) {
-  ReferenceOptions options;
-  options.older_std_translation = 0.03;
-  options.older_std_yaw = 0.01;
-  const Eigen::Vector3d variances(4 * 9e-4, 4 * 9e-4, 4 * 1e-4);
-  MultiCloneFilter filter(SE2(), kSmall);
-  Way way(filter);
-  for (int i = 0; i < 4; ++i) way.add(SE2(0.1, 0.0, 0.0));
-  EXPECT_TRUE(matricesNear(way.scans.slack(3, options), Eigen::Matrix3d(variances.asDiagonal()), 1e-12));
 }
 
 /// Round after round in one room: what one reference after the other adds up to, older ones take back.

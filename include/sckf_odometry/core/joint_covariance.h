@@ -23,8 +23,6 @@ struct Innovation {
 
   /// Normalised innovation squared rᵀ S⁻¹ r: χ² with d degrees of freedom where the model is right.
   double nis() const;
-  /// The same where so much more, d × d, is put down to errors that the covariance does not tell of.
-  double nis(const MatrixDD& slack) const;
 };
 
 /// The covariance of the augmented error state X̆ = [X̃_k; X̃; z̃_k] (5), held by its blocks and never as one matrix:

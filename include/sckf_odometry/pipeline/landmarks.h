@@ -8,7 +8,6 @@
 
 #include "sckf_odometry/core/landmark_states.h"
 #include "sckf_odometry/pipeline/feature.h"
-#include "sckf_odometry/pipeline/reference_policy.h"
 #include "sckf_odometry/pipeline/scan_report.h"
 
 namespace sckf {
@@ -44,16 +43,13 @@ class Landmarks {
   void setOptions(const LandmarkOptions& options) { options_ = options; }
 
   /// Finds the corners and lines of a scan at the filter's pose and sets those aside that are, or may become,
-  /// landmarks. reference, here as below: what the estimate may be off beyond its covariance.
+  /// landmarks.
   std::shared_ptr<const PreparedScan> claim(std::shared_ptr<const PreparedScan> scan, const LandmarkStates& filter,
-                                            const ReferenceOptions& reference, const SurfaceOptions& surface);
+                                            const SurfaceOptions& surface);
 
   /// Corrects the filter by the landmarks that the scan sees again, begins new ones, gives up those that are gone.
   /// Returns how many have been used.
-  int update(LandmarkStates& filter, const ReferenceOptions& reference);
-
-  /// The scan has become a reference.
-  void countReference();
+  int update(LandmarkStates& filter);
 
   std::vector<LandmarkView> views(const LandmarkStates& filter) const;
 
@@ -63,7 +59,6 @@ class Landmarks {
     FeatureShape shape;
     double farthest = 0.0;  // [m] from which it has been seen
     int misses = 0;         // since it was last seen
-    int references = 0;     // since it was last seen
     std::size_t seen = 0;   // number of the last scan that saw it
   };
   /// What is not, or not yet, a landmark.
@@ -88,20 +83,17 @@ class Landmarks {
   Feature landmark(std::size_t number, const LandmarkStates& filter) const {
     return {filter.landmark(number), known_[number].shape};
   }
-  void claim(std::size_t first, const LandmarkStates& filter, const ReferenceOptions& reference,
-             std::vector<bool>& aside);
+  void claim(std::size_t first, const LandmarkStates& filter, std::vector<bool>& aside);
   void giveWay(std::size_t first, double left);
-  static Eigen::Matrix3d slackOf(const Known& known, const ReferenceOptions& reference);
   static bool isOf(Stage stage, const Sight& sight);
-  std::vector<Association> compatible(const LandmarkStates& filter, const ReferenceOptions& reference,
-                                      Stage stage) const;
+  std::vector<Association> compatible(const LandmarkStates& filter, Stage stage) const;
   bool excludeEachOther(const Association& a, const Association& b, const LandmarkStates& filter) const;
   const Association* mostCertain(const std::vector<Association>& all, const LandmarkStates& filter) const;
   void use(const Association& association, LandmarkStates& filter);
   const Candidate* candidateFor(const Feature& in_odom) const;
   bool shouldSee(const Feature& in_base, double farthest) const;
   void giveUp(std::size_t landmark, LandmarkStates& filter);
-  void giveUpMissed(LandmarkStates& filter, const ReferenceOptions& reference);
+  void giveUpMissed(LandmarkStates& filter);
   bool isNearLandmark(const Feature& in_odom, const LandmarkStates& filter) const;
   void beginNew(LandmarkStates& filter);
   void remember(const Feature& in_odom);

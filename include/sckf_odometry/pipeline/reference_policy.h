@@ -23,8 +23,6 @@ struct ReferenceOptions {
   double older_min_overlap = 0.3;   ///< … nor with a smaller share of points with a partner
   double older_inflation = 8.0;     ///< of a displacement's covariance: it errs in part as the others of its scan
   double matching_common = 1.5;     ///< of a displacement's matching noise: so much more the next ones have in common
-  double older_std_translation = 0.03;  ///< [m] what the estimate may be off from an older reference, beyond its
-  double older_std_yaw = 0.01;          ///< [rad] … covariance, times the root of the references in between
 };
 
 class ReferencePolicy {

@@ -35,9 +35,6 @@ class ReferenceScans {
   std::vector<std::size_t> worthComparing(std::size_t laser, const FusionMethod& filter,
                                           const ReferenceOptions& options) const;
 
-  /// referenceSlack() of a displacement from a clone.
-  Eigen::Matrix3d slack(std::size_t clone, const ReferenceOptions& options) const;
-
  private:
   struct Reference {
     std::shared_ptr<const PreparedScan> scan;
@@ -53,8 +50,5 @@ class ReferenceScans {
 /// Whether a displacement may be far off from what is predicted: where scans have to be searched for, and not only
 /// refined.
 bool isVague(const DisplacementPrediction& prediction);
-
-/// What the filter's covariance does not tell of a displacement over so many references, 3 × 3.
-Eigen::Matrix3d referenceSlack(std::size_t references, const ReferenceOptions& options);
 
 }  // namespace sckf

@@ -133,7 +133,6 @@ class ScanOdometry {
   Match matchWithOlder(const PreparedScan& reference, const PreparedScan& scan,
                        const DisplacementPrediction& prediction, bool placed) const;
   void allowForCommonErrors(const ScanReport& report);
-  Displacement::MatrixDD slackAmongLasers(const Displacement& displacement) const;
   LandmarkStates* landmarkFilter() const;  ///< null where landmarks are not used
   void claimLandmarks(ScanReport& report);
   void useLandmarks(ScanReport& report);
