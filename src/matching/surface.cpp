@@ -9,6 +9,20 @@ namespace sckf {
 
 namespace {
 
+/// Whether both ends of a stretch lie on its line. One that does not, as a point beyond a corner or in the niche of a
+/// door, turns the line, and the scatter does not tell of it where a wall is seen at a small angle: it is compared with
+/// the noise along the beams, which hardly shows across the wall.
+bool endsLieOn(const Surface& surface, const ScannedPoints& points, double range_noise) {
+  constexpr double kFarthest = 3.0;     // std
+  constexpr double kRoughness = 0.005;  // [m] of walls, as a std
+  const auto lies_on = [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    const double std = std::hypot(kRoughness, range_noise * surface.normal.dot(points.ray[k]));
+    return std::abs(surface.normal.dot(points.point[k] - surface.centroid)) <= kFarthest * std;
+  };
+  return lies_on(surface.first) && lies_on(surface.last);
+}
+
 /// The longest stretch around point i, within [begin, end], that is straight within the noise. Noise makes a short
 /// stretch look bent now and then: one that is not straight ends the search only if the next longer one is not either.
 Surface growSurface(const ScannedPoints& points, const LineFits& fits, int i, int begin, int end, double range_noise,
@@ -20,7 +34,7 @@ Surface growSurface(const ScannedPoints& points, const LineFits& fits, int i, in
     const int last = std::min(end, i + half);
     if (last - first < 3) continue;
     const LineFits::Fit candidate = fits.fit(first, last);
-    if (candidate.scatter > options.straightness * range_noise) {
+    if (candidate.scatter > options.straightness * range_noise || !endsLieOn(candidate.surface, points, range_noise)) {
       if (bent) break;
       bent = true;
       continue;

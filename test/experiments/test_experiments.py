@@ -227,8 +227,8 @@ class AllExperiments(unittest.TestCase):
     def test_with_landmarks_beside_displacements_the_second_pass_falls_on_the_first(self) -> None:
         n = self.numbers("extensions")
         self.assertLess(n["landmarks_lines_end"], 0.1, n)
-        self.assertLess(n["landmarks_corners_end"], 0.065, n)
-        self.assertLess(n["landmarks_corners_and_lines_end"], 0.06, n)
+        self.assertLess(n["landmarks_corners_end"], 0.095, n)
+        self.assertLess(n["landmarks_corners_and_lines_end"], 0.08, n)
         self.assertEqual(len({n[f"landmarks_{key}_end"] for key in ("none", "corners", "lines", "corners_and_lines")}), 4,
                          "some had no part in it")
 

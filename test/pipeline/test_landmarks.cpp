@@ -321,7 +321,7 @@ TEST(Landmarks, OnALoopTheSecondPassFallsOnTheFirst) {
     driven.run(0, 80000);
     return gapBetweenPasses(driven);
   };
-  EXPECT_LT(gap("corners", 0.08), std::min(0.25, 0.5 * gap("none", 0.08)));
+  EXPECT_LT(gap("corners", 0.06), std::min(0.15, 0.5 * gap("none", 0.06)));
   EXPECT_LT(gap("lines", 0.03), std::min(0.05, 0.5 * gap("none", 0.03)));
   // The second pass is nearer to the truth: the wheels' scale is known then.
   EXPECT_LT(gap("lines", 0.03, true), 0.1) << "the wheels alone come back somewhere else";
