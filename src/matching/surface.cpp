@@ -9,6 +9,10 @@ namespace sckf {
 
 namespace {
 
+double distanceAcross(const Surface& surface, const Eigen::Vector2d& p) {
+  return std::abs(surface.normal.dot(p - surface.centroid));
+}
+
 /// Whether both ends of a stretch lie on its line. One that does not, as a point beyond a corner or in the niche of a
 /// door, turns the line, and the scatter does not tell of it where a wall is seen at a small angle: it is compared with
 /// the noise along the beams, which hardly shows across the wall.
@@ -17,8 +21,9 @@ bool endsLieOn(const Surface& surface, const ScannedPoints& points, double range
   constexpr double kRoughness = 0.005;  // [m] of walls, as a std
   const auto lies_on = [&](int i) {
     const auto k = static_cast<std::size_t>(i);
-    const double std = std::hypot(kRoughness, range_noise * surface.normal.dot(points.ray[k]));
-    return std::abs(surface.normal.dot(points.point[k] - surface.centroid)) <= kFarthest * std;
+    const double noise = range_noise * surface.normal.dot(points.ray[k]);
+    const double distance = distanceAcross(surface, points.point[k]);
+    return distance * distance <= kFarthest * kFarthest * (kRoughness * kRoughness + noise * noise);  // hypot is slow
   };
   return lies_on(surface.first) && lies_on(surface.last);
 }
@@ -65,7 +70,7 @@ const Surface* surfaceOfNeighbours(const ScannedPoints& points, const std::vecto
       if (j < 0 || j >= static_cast<int>(surfaces.size())) continue;
       const Surface& surface = surfaces[static_cast<std::size_t>(j)];
       const bool covers = surface.valid() && surface.first <= i && i <= surface.last;
-      if (covers && std::abs(surface.normal.dot(p - surface.centroid)) < kOnSurface * range_noise) return &surface;
+      if (covers && distanceAcross(surface, p) < kOnSurface * range_noise) return &surface;
     }
   }
   return nullptr;
