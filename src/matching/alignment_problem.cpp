@@ -186,4 +186,8 @@ double AlignmentProblem::cost(const SE2& reference_from_current) const {
   return points * (sum + kContradiction * contradicting) / (paired + contradicting);
 }
 
+double AlignmentProblem::misfit(const SE2& reference_from_current) const {
+  return cost(reference_from_current) / static_cast<double>(current_.size());
+}
+
 }  // namespace sckf

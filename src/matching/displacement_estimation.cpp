@@ -271,7 +271,6 @@ std::optional<DisplacementEstimate> estimateDisplacement(const AlignmentProblem&
   z.matching_noise += placeNoise(z, estimate.decisive, options.place_std);
   estimate.range_offset = rangeOffset(problem, loss, seen);
   estimate.sweep_duration = sweepDuration(loss, seen);
-  estimate.residual_rms = std::sqrt(loss.meanSquare());
   return estimate;
 }
 

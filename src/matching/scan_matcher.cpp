@@ -225,8 +225,8 @@ Match concluded(const std::optional<Alignment>& aligned, const MatcherOptions& o
   match.pairs = aligned->problem.pairs();
   match.overlap = aligned->problem.overlap();
   match.agreement = aligned->problem.agreement();
+  match.misfit = aligned->problem.misfit(start);
   if (estimate) {
-    match.residual_rms = estimate->residual_rms;
     match.decisive = std::move(estimate->decisive);
     match.range_offset = estimate->range_offset;
     match.sweep_duration = estimate->sweep_duration;

@@ -128,7 +128,8 @@ Match ScanOdometry::matchWithOlder(const PreparedScan& reference, const Prepared
                                    const DisplacementPrediction& prediction, bool placed) const {
   if (placed && isVague(prediction)) {
     Match match = matcher_.match(reference, scan, prediction);
-    if (match.displacement && matchesWell(match, options_.gate.doubtful_min_agreement)) return match;
+    const bool agrees = match.agreement >= options_.gate.doubtful_min_agreement;
+    if (match.displacement && agrees && matchesWell(match)) return match;
   }
   return matcher_.matchNear(reference, scan, prediction);
 }
@@ -171,24 +172,27 @@ double ScanOdometry::gate(const Displacement& displacement) const {
   return chiSquared(displacement.dimension(), options_.gate.probability);
 }
 
-/// Where the scans refute what the wheels tell these are wrong, and any match will do that fits as well otherwise.
+/// Where the scans refute what the wheels tell these are wrong, and any match will do that has its place.
 bool ScanOdometry::looksLikeSlip(const ScanReport& report) const {
   const Match& match = report.match;
   if (outweighsWheels(match)) return true;
-  return options_.gate.trust_scans_on_slip && matchesWell(match, 0.0) &&
+  return options_.gate.trust_scans_on_slip && isPlaced(match) &&
          matcher_.refutes(references_[match.displacement->clone], *report.scan,
                           report.prediction.reference_from_current);
 }
 
 bool ScanOdometry::outweighsWheels(const Match& match) const {
-  return options_.gate.trust_scans_on_slip && matchesWell(match, options_.gate.slip_min_agreement);
+  return options_.gate.trust_scans_on_slip && matchesWell(match);
 }
 
-bool ScanOdometry::matchesWell(const Match& match, double min_agreement) const {
+bool ScanOdometry::matchesWell(const Match& match) const {
+  return isPlaced(match) && match.misfit <= options_.gate.slip_max_misfit;
+}
+
+/// One wall lies on any other, however the robot is turned.
+bool ScanOdometry::isPlaced(const Match& match) const {
   const Eigen::Index seen = match.displacement->dimension();
-  // One wall lies on any other, however the robot is turned.
-  const bool placed = seen == 3 || (seen == 2 && match.overlap >= options_.gate.slip_min_overlap);
-  return placed && match.agreement >= min_agreement && match.residual_rms <= options_.gate.slip_max_residual;
+  return seen == 3 || (seen == 2 && match.overlap >= options_.gate.slip_min_overlap);
 }
 
 void ScanOdometry::useHeading(ScanReport& report) {

@@ -275,7 +275,7 @@ sckf_odometry::Status toStatus(const ScanReport& report, const std::string& meth
   status.pairs = static_cast<uint32_t>(report.match.pairs.size());
   status.overlap = report.match.overlap;
   status.agreement = report.match.agreement;
-  status.residual_rms = report.match.residual_rms;
+  status.misfit = report.match.misfit;
   if (report.innovation) {
     status.dimension = static_cast<uint8_t>(report.innovation->residual.size());
     status.nis = report.innovation->nis();

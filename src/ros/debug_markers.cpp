@@ -112,9 +112,9 @@ void drawArrow(Marker& marker, const SE2& odom_from_base, const SE2& odom_from_r
 
 std::string numbers(const ScanReport& report) {
   std::array<char, 200> text{};
-  std::snprintf(text.data(), text.size(), "%s\n%zu pairs, overlap %.0f %%, residual %.2f",
+  std::snprintf(text.data(), text.size(), "%s\n%zu pairs, overlap %.0f %%, misfit %.2f",
                 toString(report.outcome).c_str(), report.match.pairs.size(), 100.0 * report.match.overlap,
-                report.match.residual_rms);
+                report.match.misfit);
   return text.data();
 }
 

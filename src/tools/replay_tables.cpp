@@ -66,7 +66,7 @@ void writeCsvHeader(OutputFile& file) {
       "reference_stamp,predicted_x,predicted_y,predicted_yaw,displacement_x,displacement_y,displacement_yaw,dimension,"
       "displacement_var_x,displacement_cov_xy,displacement_cov_xyaw,displacement_var_y,displacement_cov_yyaw,"
       "displacement_var_yaw,innovation_1,innovation_2,innovation_3,nis,"
-      "normalised_x,normalised_y,normalised_yaw,pairs,overlap,agreement,residual_rms,new_reference,outcome,reason\n");
+      "normalised_x,normalised_y,normalised_yaw,pairs,overlap,agreement,misfit,new_reference,outcome,reason\n");
 }
 
 void writeCsvLine(OutputFile& file, const ScanReport& report) {
@@ -83,7 +83,7 @@ void writeCsvLine(OutputFile& file, const ScanReport& report) {
     writeEmpty(file, 21);
   }
   file.print(",%zu,%.6f,%.6f,%.6f,%d,%s,\"%s\"\n", report.match.pairs.size(), report.match.overlap,
-             report.match.agreement, report.match.residual_rms, report.new_reference ? 1 : 0,
+             report.match.agreement, report.match.misfit, report.new_reference ? 1 : 0,
              toString(report.outcome).c_str(), report.reason.c_str());
 }
 

@@ -256,7 +256,7 @@ TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
   report.match.pairs.resize(30);
   report.match.overlap = 0.8;
   report.match.agreement = 0.9;
-  report.match.residual_rms = 1.1;
+  report.match.misfit = 1.1;
   report.innovation = Innovation();
   report.innovation->residual = Eigen::Vector2d(1.0, 2.0);
   report.innovation->covariance = Eigen::Matrix2d::Identity();
@@ -286,7 +286,7 @@ TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
   EXPECT_EQ(status.pairs, 30u);
   EXPECT_EQ(status.overlap, 0.8);
   EXPECT_EQ(status.agreement, 0.9);
-  EXPECT_EQ(status.residual_rms, 1.1);
+  EXPECT_EQ(status.misfit, 1.1);
   EXPECT_EQ(status.dimension, 2);
   EXPECT_NEAR(status.nis, 5.0, 1e-12);
   EXPECT_EQ(status.nis_bound, 13.8);

@@ -38,7 +38,7 @@ ScanReport comparedScan() {
   report.estimate->odom_from_base = SE2(1.0, 2.5, kQuarter);
   report.match.pairs = {{1, 0}};
   report.match.overlap = 0.815;
-  report.match.residual_rms = 1.25;
+  report.match.misfit = 1.25;
   return report;
 }
 
@@ -186,10 +186,10 @@ TEST(DebugMarkers, TwoDirectionsAreTwoArrows) {
 TEST(DebugMarkers, TheLabelSaysWhatBecameOfTheScanAndHowLargeTheEllipseIs) {
   ScanReport report = withDisplacement(displacementSeeing(rows({0, 1, 2}), Eigen::Vector3d(4e-4, 1e-4, 1e-4)));
   EXPECT_EQ(drawn(report, "label").text,
-            "updated\n1 pairs, overlap 82 %, residual 1.25\n95 %: 4.9 x 2.4 cm (drawn x 10)");
+            "updated\n1 pairs, overlap 82 %, misfit 1.25\n95 %: 4.9 x 2.4 cm (drawn x 10)");
   report.outcome = ScanOutcome::kNoMatch;
   report.match.displacement.reset();
-  EXPECT_EQ(drawn(report, "label").text, "no match\n1 pairs, overlap 82 %, residual 1.25");
+  EXPECT_EQ(drawn(report, "label").text, "no match\n1 pairs, overlap 82 %, misfit 1.25");
 }
 
 TEST(DebugMarkers, AllAreInTheFrameOfTheEstimateAtTheScansStamp) {

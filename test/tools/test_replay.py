@@ -30,7 +30,7 @@ COLUMNS = ("stamp,x,y,yaw,var_x,cov_xy,cov_xyaw,var_y,cov_yyaw,var_yaw,"
            "displacement_var_x,displacement_cov_xy,displacement_cov_xyaw,displacement_var_y,displacement_cov_yyaw,"
            "displacement_var_yaw,innovation_1,innovation_2,innovation_3,nis,"
            "normalised_x,normalised_y,normalised_yaw,"
-           "pairs,overlap,agreement,residual_rms,new_reference,outcome,reason").split(",")
+           "pairs,overlap,agreement,misfit,new_reference,outcome,reason").split(",")
 
 
 class ReplayTest(unittest.TestCase):

@@ -117,6 +117,9 @@ class AlignmentProblem {
   /// other scan cannot see counts as the average of what it can, as otherwise places would be preferred that it sees.
   double cost(const SE2& reference_from_current) const;
 
+  /// The same for a point, on average: 0 where all lie on the reference, 3 where it has looked through all of them.
+  double misfit(const SE2& reference_from_current) const;
+
  private:
   void addSurfacePair(const Pair& pair, const RigidMotion& reference_from_current, const PairOptions& options);
   void addPointPair(const Pair& pair, const PairOptions& options);

@@ -31,7 +31,6 @@ struct DisplacementEstimate {
   ConstantEvidence range_offset;    ///< to be added to each range of both scans [m]
   ConstantEvidence sweep_duration;  ///< EvenSweep::duration of both [s]
   DecisivePlace decisive;           ///< the place that decides most of it
-  double residual_rms = 0.0;        ///< of the weighted residuals: 1 where the noise explains them
 };
 
 /// The displacement that solves the problem with its pairs and weights as they are, starting from where the pairs were

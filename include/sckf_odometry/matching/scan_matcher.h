@@ -53,11 +53,11 @@ struct Match {
   std::vector<Pair> pairs;          ///< at the aligned pose
   double overlap = 0.0;             ///< share of the points of the current scan that have a partner, 0 to 1
   double agreement = 0.0;           ///< AlignmentProblem::agreement(), 0 to 1
+  double misfit = 0.0;              ///< AlignmentProblem::misfit(), 0 to 3
   DecisivePlace decisive;           ///< the place that decides most of the displacement
   bool place_left_out = false;      ///< another place decided more, and seems to have moved
   ConstantEvidence range_offset;    ///< DisplacementEstimate::range_offset
   ConstantEvidence sweep_duration;  ///< DisplacementEstimate::sweep_duration
-  double residual_rms = 0.0;        ///< of the weighted residuals: 1 where the noise explains them
 };
 
 class ScanMatcher {

@@ -31,8 +31,7 @@ struct GateOptions {
   bool trust_scans_on_slip = true;    ///< where the scans match well, put the contradiction down to the wheels
   double slip_std_translation = 0.5;  ///< [m] what the wheels may have been wrong by in such an interval …
   double slip_std_yaw = 0.5;          ///< [rad] … and in yaw
-  double slip_min_agreement = 0.7;    ///< scans match well if they agree by at least so much …
-  double slip_max_residual = 1.75;    ///< … the weighted residuals are at most this …
+  double slip_max_misfit = 1.3;       ///< scans match well if Match::misfit is at most this …
   double slip_min_overlap = 0.6;  ///< … and where they see two directions only, this share of the points has a partner
   double doubtful_min_agreement = 0.85;  ///< agreement that a reference needs which could not be placed itself, and an
                                          ///< older one that is found far from the prediction
@@ -139,7 +138,8 @@ class ScanOdometry {
   double gate(const Displacement& displacement) const;  ///< a larger innovation, normalised and squared, contradicts
   bool looksLikeSlip(const ScanReport& report) const;
   bool outweighsWheels(const Match& match) const;
-  bool matchesWell(const Match& match, double min_agreement) const;
+  bool matchesWell(const Match& match) const;
+  bool isPlaced(const Match& match) const;
   ScanMotion motionDuring(const WaitingScans::Entry& waiting) const;
   EvenSweep evenSweep(const WaitingScans::Entry& waiting) const;
   void propagateTo(Stamp stamp);
