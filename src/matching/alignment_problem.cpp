@@ -60,12 +60,12 @@ void AlignmentProblem::addSurfacePair(const Pair& pair, const RigidMotion& refer
   if (seen.valid() && surface.normal.dot(C * seen.normal) < std::cos(options.max_normal_angle)) return;
 
   const double along = surface.tangent().dot(C * current_.points.point[j] + t - surface.centroid);
-  const double line_variance = square(reference_.range_noise * surface.normal.dot(reference_.points.ray[i])) *
-                               (1.0 / surface.size() + square(along) / surface.spread);
+  const double point_variance = square(reference_.range_noise * surface.normal.dot(reference_.points.ray[i]));
+  const double line_variance = point_variance * (1.0 / surface.size() + square(along) / surface.spread);
   const double variance = square(current_.range_noise * incidence) + line_variance + square(options.surface_roughness);
   pairs_.push_back(pair);
-  residuals_.push_back(
-      {pair.reference, pair.current, surface.normal, surface.centroid, &surface, 1.0 / std::sqrt(variance)});
+  residuals_.push_back({pair.reference, pair.current, surface.normal, surface.centroid, &surface,
+                        1.0 / std::sqrt(variance), (point_variance + square(kWallRoughness)) / surface.spread});
 }
 
 void AlignmentProblem::addPointPair(const Pair& pair, const PairOptions& options) {
@@ -162,11 +162,10 @@ NormalEquations AlignmentProblem::normalEquations(const SE2& reference_from_curr
     lever_square_sum += t.lever.squaredNorm();
     if (residual.surface == nullptr) continue;
     const Eigen::Vector3d dA = derivativeByNormal(residual, t);
-    spurious += w / residual.surface->spread * dA * dA.transpose();
+    spurious += w * residual.normal_variance * dA * dA.transpose();
   }
   const double weight = 1.0 / square(scale_);
-  return {weight * squares.information(), weight * squares.gradient(),
-          weight * square(reference_.range_noise) * spurious,
+  return {weight * squares.information(), weight * squares.gradient(), weight * spurious,
           std::sqrt(lever_square_sum / static_cast<double>(residuals_.size()))};
 }
 

@@ -17,19 +17,25 @@ double distanceAcross(const Surface& surface, const Eigen::Vector2d& p) {
 /// door, turns the line, and the scatter does not tell of it where a wall is seen at a small angle: it is compared with
 /// the noise along the beams, which hardly shows across the wall.
 bool endsLieOn(const Surface& surface, const ScannedPoints& points, double range_noise) {
-  constexpr double kFarthest = 3.0;     // std
-  constexpr double kRoughness = 0.005;  // [m] of walls, as a std
+  constexpr double kFarthest = 3.0;  // std
   const auto lies_on = [&](int i) {
     const auto k = static_cast<std::size_t>(i);
     const double noise = range_noise * surface.normal.dot(points.ray[k]);
+    const double variance = kWallRoughness * kWallRoughness + noise * noise;
     const double distance = distanceAcross(surface, points.point[k]);
-    return distance * distance <= kFarthest * kFarthest * (kRoughness * kRoughness + noise * noise);  // hypot is slow
+    return distance * distance <= kFarthest * kFarthest * variance;  // square roots are slow
   };
   return lies_on(surface.first) && lies_on(surface.last);
 }
 
-/// The longest stretch around point i, within [begin, end], that is straight within the noise. Noise makes a short
-/// stretch look bent now and then: one that is not straight ends the search only if the next longer one is not either.
+double length(const Surface& surface, const ScannedPoints& points) {
+  return (points.point[static_cast<std::size_t>(surface.last)] - points.point[static_cast<std::size_t>(surface.first)])
+      .norm();
+}
+
+/// The longest stretch around point i that is straight within the noise, between the points begin and end. Noise makes
+/// a short stretch look bent now and then: one that is not straight ends the search only if the next longer one is not
+/// either.
 Surface growSurface(const ScannedPoints& points, const LineFits& fits, int i, int begin, int end, double range_noise,
                     const SurfaceOptions& options) {
   Surface longest;
@@ -46,11 +52,19 @@ Surface growSurface(const ScannedPoints& points, const LineFits& fits, int i, in
     }
     bent = false;
     longest = candidate.surface;
-    const Eigen::Vector2d& a = points.point[static_cast<std::size_t>(first)];
-    const Eigen::Vector2d& b = points.point[static_cast<std::size_t>(last)];
-    if ((b - a).norm() > options.length || (first == begin && last == end)) break;
+    if (length(longest, points) > options.length || (first == begin && last == end)) break;
   }
   return longest;
+}
+
+/// Where no stretch around a point is straight it may be where a surface ends: at a corner, or at a door. A stretch to
+/// one side of it is a surface if it is as long as any: short ones are often no wall but the niche behind one.
+Surface growToOneSide(const ScannedPoints& points, const LineFits& fits, int i, int begin, int end, double range_noise,
+                      const SurfaceOptions& options) {
+  const Surface before = growSurface(points, fits, i, begin, i, range_noise, options);
+  const Surface after = growSurface(points, fits, i, i, end, range_noise, options);
+  const Surface& longer = before.spread > after.spread ? before : after;
+  return longer.valid() && length(longer, points) > options.length ? longer : Surface();
 }
 
 /// The std of the direction of a fit is σ / √spread.
@@ -89,6 +103,7 @@ std::vector<Surface> fitSurfaces(const ScannedPoints& points, double range_noise
     for (int i = begin; i <= end; ++i) {
       const auto k = static_cast<std::size_t>(i);
       Surface surface = growSurface(points, fits, i, begin, end, range_noise, options);
+      if (!surface.valid()) surface = growToOneSide(points, fits, i, begin, end, range_noise, options);
       if (!hasDirection(surface, range_noise, options)) continue;
       if (surface.normal.dot(points.ray[k]) > 0.0) surface.normal = -surface.normal;
       surfaces[k] = surface;

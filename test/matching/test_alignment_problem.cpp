@@ -96,12 +96,35 @@ TEST(AlignmentProblem, WhatTheOtherScanCannotSeeCostsNoMoreThanWhatItSees) {
   const SE2 back(-1.0, 0.0, 0.0);
   const auto reference = roomWithBoardFrom(SE2());
   const auto current = roomWithBoardFrom(back);
-  const auto costAt = [&](const SE2& x) {
-    return AlignmentProblem(*reference, *current, x, 0.2, PairOptions()).cost(x) / static_cast<double>(current->size());
+  const auto misfitAt = [&](const SE2& x) {
+    return AlignmentProblem(*reference, *current, x, 0.2, PairOptions()).misfit(x);
   };
-  EXPECT_LT(costAt(back), 0.1);
-  EXPECT_GT(costAt(SE2()), 0.5) << "where more of the points have a partner, and more contradict";
-  EXPECT_GT(costAt(SE2(0.0, 0.0, M_PI)), 1.0) << "where there is nothing to compare";
+  EXPECT_LT(misfitAt(back), 0.1);
+  EXPECT_GT(misfitAt(SE2()), 0.5) << "where more of the points have a partner, and more contradict";
+  EXPECT_GT(misfitAt(SE2(0.0, 0.0, M_PI)), 1.0) << "where there is nothing to compare";
+}
+
+TEST(AlignmentProblem, PointsThatTheReferenceHasLookedThroughAllAreOfTheLargestMisfit) {
+  const auto large = scanOf(closedPolygon({{-3.0, -3.0}, {3.0, -3.0}, {3.0, 3.0}, {-3.0, 3.0}}));
+  const auto small = scanOf(closedPolygon({{-1.0, -1.0}, {1.0, -1.0}, {1.0, 1.0}, {-1.0, 1.0}}));
+  const AlignmentProblem problem(*large, *small, SE2(), 0.2, PairOptions());
+  EXPECT_DOUBLE_EQ(problem.misfit(SE2()), 3.0);
+}
+
+/// Noise along the beams shows less across a wall the smaller the angle that it is seen at, its roughness always.
+TEST(AlignmentProblem, NormalsAreAsNoisyAsTheirPointsAcrossThem) {
+  const auto scan = scanOf(closedPolygon({{-3.0, -3.0}, {3.0, -3.0}, {3.0, 3.0}, {-3.0, 3.0}}));
+  const AlignmentProblem problem(*scan, *scan, SE2(), 0.3, PairOptions());
+  int compared = 0;
+  for (const Residual& residual : problem.residuals()) {
+    const Eigen::Vector2d& p = scan->points.point[static_cast<std::size_t>(residual.reference)];
+    if (residual.surface == nullptr || p.cwiseAbs().minCoeff() > 2.0) continue;
+    const double across = scan->range_noise * p.cwiseAbs().maxCoeff() / p.norm();
+    const double expected = (across * across + kWallRoughness * kWallRoughness) / residual.surface->spread;
+    EXPECT_NEAR(residual.normal_variance, expected, 1e-3 * expected) << p.transpose();
+    ++compared;
+  }
+  EXPECT_GT(compared, 100);
 }
 
 }  // namespace

@@ -91,7 +91,7 @@ class CramerRaoBound : public ::testing::TestWithParam<Room> {};
 
 TEST_P(CramerRaoBound, IsNearlyReached) {
   constexpr int kRuns = 500;
-  constexpr double kAtMost = 1.30;  // its std is 3 % with so many runs
+  constexpr double kAtMost = 1.20;  // its std is 3 % with so many runs
   const World& world = GetParam().world;
   SimulatedLaser laser;
   laser.noise = 0.02;

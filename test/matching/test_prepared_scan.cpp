@@ -254,6 +254,31 @@ TEST(Surfaces, NichesOfDoorsDoNotTurnAWall) {
   EXPECT_LT(turned, 0.3 * on_wall) << turned << " of " << on_wall << " surfaces are turned";
 }
 
+/// Around most points near a corner no stretch is straight.
+TEST(Surfaces, ReachUpToTheCornersOfARoom) {
+  constexpr double kNear = 0.4;  // [m]
+  const World room = closedPolygon({{-3.0, -3.0}, {3.0, -3.0}, {3.0, 3.0}, {-3.0, 3.0}});
+  std::mt19937_64 random(5);
+  SimulatedLaser laser;
+  laser.noise = 0.01;
+  int near_corner = 0;
+  int with_surface = 0;
+  for (double x = -0.5; x < 0.5; x += 0.1) {
+    const SE2 pose(x, 0.3, 0.0);
+    const auto scan = prepareScan(simulateScan(room, pose, laser, &random), kAtBase, ScanOptions());
+    ASSERT_NE(scan, nullptr);
+    for (std::size_t i = 0; i < scan->size(); ++i) {
+      const Eigen::Vector2d p = (scan->points.point[i] + pose.translation()).cwiseAbs();
+      const Surface& surface = scan->surface[i];
+      if (p.minCoeff() < 3.0 - kNear) continue;
+      ++near_corner;
+      with_surface += surface.valid() && surface.normal.cwiseAbs().maxCoeff() > std::cos(0.03) ? 1 : 0;
+    }
+  }
+  ASSERT_GT(near_corner, 300);
+  EXPECT_GT(with_surface, 0.8 * near_corner) << with_surface << " of " << near_corner;
+}
+
 TEST(Surfaces, DoNotReachAcrossADepthDiscontinuity) {
   LaserScan scan = wallAhead();
   for (std::size_t i = 45; i < scan.ranges.size(); ++i) scan.ranges[i] *= 2.0F;  // the wall behind is 4 m away

@@ -44,6 +44,7 @@ struct Residual {
   Eigen::Vector2d anchor;            ///< a: centroid of the surface, or the point itself
   const Surface* surface = nullptr;  ///< null for single points
   double precision = 1.0;            ///< 1 / σ [1/m], since divisions take long
+  double normal_variance = 0.0;      ///< of the direction of the surface's normal [rad²]
 };
 
 /// Everything that one residual has to tell at a displacement.

@@ -8,6 +8,9 @@
 
 namespace sckf {
 
+/// [m] How far a wall departs from a straight line as it is built, as a std.
+constexpr double kWallRoughness = 0.005;
+
 struct SurfaceOptions {
   double straightness = 1.7;     ///< a surface is straight while its points scatter by this many std of a range
   double length = 1.0;           ///< [m] the stretch over which a surface is fitted grows up to this
