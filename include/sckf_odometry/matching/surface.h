@@ -12,8 +12,9 @@ namespace sckf {
 constexpr double kWallRoughness = 0.005;
 
 struct SurfaceOptions {
-  double straightness = 1.7;     ///< a surface is straight while its points scatter by this many std of a range
-  double length = 1.0;           ///< [m] the stretch over which a surface is fitted grows up to this
+  double straightness = 1.7;  ///< a surface is straight while its points scatter by this many std of a range
+  double length = 1.0;        ///< [m] the stretch over which a surface is fitted grows up to this; one that ends at its
+                              ///< point has to be so long
   double max_normal_std = 0.07;  ///< [rad] a surface whose direction is known worse is no surface but single points
 };
 
