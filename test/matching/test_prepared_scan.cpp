@@ -222,6 +222,20 @@ TEST(Surfaces, NormalsOfNoisyDenseScansAreKnownAsWellAsTheyClaim) {
   EXPECT_GT(normalised_square / count, 0.3);
 }
 
+/// Of scans of a world, with noise [m], from places along x up to half a metre to either side of the origin.
+template <typename Look>
+void lookAtSurfaces(const World& world, double noise, double step, double y, std::uint64_t seed, const Look& look) {
+  std::mt19937_64 random(seed);
+  SimulatedLaser laser;
+  laser.noise = noise;
+  for (double x = -0.5; x < 0.5; x += step) {
+    const SE2 pose(x, y, 0.0);
+    const auto scan = prepareScan(simulateScan(world, pose, laser, &random), kAtBase, ScanOptions());
+    ASSERT_NE(scan, nullptr);
+    for (std::size_t i = 0; i < scan->size(); ++i) look(pose, scan->points.point[i], scan->surface[i]);
+  }
+}
+
 //      ____    ____      The niches of doors in one wall of a corridor. A stretch that ends in one is turned by it, and
 //  ___|    |__|    |__   the scatter does not tell, as range noise hardly shows across a wall at a small angle.
 //   >                    Short stretches are turned by the noise alone now and then.
@@ -234,22 +248,13 @@ TEST(Surfaces, NichesOfDoorsDoNotTurnAWall) {
   }
   corners.insert(corners.end(), {{19.0, -1.0}, {19.0, 1.2}, {-2.0, 1.2}});
   const World corridor = closedPolygon(corners);
-  std::mt19937_64 random(4);
-  SimulatedLaser laser;
-  laser.noise = 0.015;
   int on_wall = 0;
   int turned = 0;
-  for (double x = -0.5; x < 0.5; x += 0.02) {
-    const auto scan = prepareScan(simulateScan(corridor, SE2(x, 0.0, 0.0), laser, &random), kAtBase, ScanOptions());
-    ASSERT_NE(scan, nullptr);
-    for (std::size_t i = 0; i < scan->size(); ++i) {
-      const Surface& surface = scan->surface[i];
-      const Eigen::Vector2d& p = scan->points.point[i];
-      if (!surface.valid() || p.x() < 1.0 || p.x() > 12.0 || p.y() > -0.9) continue;
-      ++on_wall;
-      turned += std::abs(surface.normal.x()) > kTurned ? 1 : 0;
-    }
-  }
+  lookAtSurfaces(corridor, 0.015, 0.02, 0.0, 4, [&](const SE2&, const Eigen::Vector2d& p, const Surface& surface) {
+    if (!surface.valid() || p.x() < 1.0 || p.x() > 12.0 || p.y() > -0.9) return;
+    ++on_wall;
+    turned += std::abs(surface.normal.x()) > kTurned ? 1 : 0;
+  });
   ASSERT_GT(on_wall, 500);
   EXPECT_LT(turned, 0.3 * on_wall) << turned << " of " << on_wall << " surfaces are turned";
 }
@@ -258,23 +263,13 @@ TEST(Surfaces, NichesOfDoorsDoNotTurnAWall) {
 TEST(Surfaces, ReachUpToTheCornersOfARoom) {
   constexpr double kNear = 0.4;  // [m]
   const World room = closedPolygon({{-3.0, -3.0}, {3.0, -3.0}, {3.0, 3.0}, {-3.0, 3.0}});
-  std::mt19937_64 random(5);
-  SimulatedLaser laser;
-  laser.noise = 0.01;
   int near_corner = 0;
   int with_surface = 0;
-  for (double x = -0.5; x < 0.5; x += 0.1) {
-    const SE2 pose(x, 0.3, 0.0);
-    const auto scan = prepareScan(simulateScan(room, pose, laser, &random), kAtBase, ScanOptions());
-    ASSERT_NE(scan, nullptr);
-    for (std::size_t i = 0; i < scan->size(); ++i) {
-      const Eigen::Vector2d p = (scan->points.point[i] + pose.translation()).cwiseAbs();
-      const Surface& surface = scan->surface[i];
-      if (p.minCoeff() < 3.0 - kNear) continue;
-      ++near_corner;
-      with_surface += surface.valid() && surface.normal.cwiseAbs().maxCoeff() > std::cos(0.03) ? 1 : 0;
-    }
-  }
+  lookAtSurfaces(room, 0.01, 0.1, 0.3, 5, [&](const SE2& pose, const Eigen::Vector2d& p, const Surface& surface) {
+    if ((p + pose.translation()).cwiseAbs().minCoeff() < 3.0 - kNear) return;
+    ++near_corner;
+    with_surface += surface.valid() && surface.normal.cwiseAbs().maxCoeff() > std::cos(0.03) ? 1 : 0;
+  });
   ASSERT_GT(near_corner, 300);
   EXPECT_GT(with_surface, 0.8 * near_corner) << with_surface << " of " << near_corner;
 }
