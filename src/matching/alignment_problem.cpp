@@ -169,7 +169,7 @@ NormalEquations AlignmentProblem::normalEquations(const SE2& reference_from_curr
           std::sqrt(lever_square_sum / static_cast<double>(residuals_.size()))};
 }
 
-double AlignmentProblem::cost(const SE2& reference_from_current) const {
+double AlignmentProblem::misfit(const SE2& reference_from_current) const {
   constexpr double kContradiction = 3.0;
   constexpr double kFewest = 0.3;  // of the points: so many are compared in any case, as contradictions
   const RigidMotion motion(reference_from_current);
@@ -182,11 +182,7 @@ double AlignmentProblem::cost(const SE2& reference_from_current) const {
   const auto points = static_cast<double>(current_.size());
   const auto paired = static_cast<double>(pairs_.size());
   const double contradicting = contradictions() + std::max(0.0, kFewest * points - paired);
-  return points * (sum + kContradiction * contradicting) / (paired + contradicting);
-}
-
-double AlignmentProblem::misfit(const SE2& reference_from_current) const {
-  return cost(reference_from_current) / static_cast<double>(current_.size());
+  return (sum + kContradiction * contradicting) / (paired + contradicting);
 }
 
 }  // namespace sckf

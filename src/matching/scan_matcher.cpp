@@ -21,8 +21,7 @@ struct Alignment {
   double surprise = 0.0;  // squared Mahalanobis distance from the prior
   AlignmentProblem problem;
 
-  /// Of the points: smaller is better.
-  double cost() const { return problem.cost(reference_from_current); }
+  double misfit() const { return problem.misfit(reference_from_current); }
 };
 
 /// The search for one displacement: scans, prior and options of a call of match().
@@ -71,7 +70,7 @@ class Search {
  private:
   static constexpr double kRough = 2.0;          // residuals of twice what noise explains
   static constexpr double kSurprise = 16.0;      // four sigma from the prior
-  static constexpr double kGain = 0.3;           // of the points' cost, for each: for less the prior is not given up
+  static constexpr double kGain = 0.3;           // misfit: for less the prior is not given up
   static constexpr double kAgreesBetter = 0.05;  // for less one place far from the prior is not left for another
 
   static Eigen::Matrix3d priorFloor(const MatcherOptions& options) {
@@ -87,9 +86,10 @@ class Search {
     for (int k = -options_.search_yaw_steps; k <= options_.search_yaw_steps; ++k) {
       if (k == 0) continue;
       const SE2 x(mean_.x, mean_.y, mean_.yaw + k * options_.search_yaw_step);
-      const double cost = AlignmentProblem(reference_, current_, x, options_.icp_pair_distance, options_.pairs).cost(x);
-      if (cost < least) {
-        least = cost;
+      const double misfit =
+          AlignmentProblem(reference_, current_, x, options_.icp_pair_distance, options_.pairs).misfit(x);
+      if (misfit < least) {
+        least = misfit;
         best = x;
       }
     }
@@ -176,7 +176,8 @@ class Search {
   /// rough, so that a few tell as much as one: the prior counts so many times.
   static double cost(const Alignment& alignment) {
     constexpr double kAlike = 4.0;
-    return alignment.cost() + kAlike * 0.5 * alignment.surprise;
+    const auto points = static_cast<double>(alignment.problem.current().size());
+    return points * alignment.misfit() + kAlike * 0.5 * alignment.surprise;
   }
 
   static void keepBetter(std::optional<Alignment>& best, std::optional<Alignment> other) {
@@ -187,8 +188,8 @@ class Search {
   /// explains clearly more of the points, than one that is far, too, if it agrees better as well.
   bool better(const Alignment& far, const Alignment& best) const {
     const bool near = best.surprise <= kSurprise;
-    if (near) return far.cost() + kGain * static_cast<double>(current_.size()) < best.cost();
-    return far.cost() < best.cost() && far.problem.agreement() > best.problem.agreement() + kAgreesBetter;
+    if (near) return far.misfit() + kGain < best.misfit();
+    return far.misfit() < best.misfit() && far.problem.agreement() > best.problem.agreement() + kAgreesBetter;
   }
 
   bool fits(const Alignment& alignment) const {
@@ -225,7 +226,7 @@ Match concluded(const std::optional<Alignment>& aligned, const MatcherOptions& o
   match.pairs = aligned->problem.pairs();
   match.overlap = aligned->problem.overlap();
   match.agreement = aligned->problem.agreement();
-  match.misfit = aligned->problem.misfit(start);
+  match.misfit = aligned->misfit();
   if (estimate) {
     match.decisive = std::move(estimate->decisive);
     match.range_offset = estimate->range_offset;

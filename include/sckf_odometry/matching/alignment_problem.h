@@ -114,11 +114,10 @@ class AlignmentProblem {
 
   NormalEquations normalEquations(const SE2& reference_from_current) const;
 
-  /// Loss of the whole current scan: compares alignments with each other. A contradiction has a fixed price; what the
-  /// other scan cannot see counts as the average of what it can, as otherwise places would be preferred that it sees.
-  double cost(const SE2& reference_from_current) const;
-
-  /// The same for a point, on average: 0 where all lie on the reference, 3 where it has looked through all of them.
+  /// Mean loss of the points of the current scan: compares alignments with each other, and tells how well scans match:
+  /// 0 where all lie on the reference, 3 where it has looked through all of them. A contradiction has a fixed price;
+  /// what the other scan cannot see counts as the average of what it can, as otherwise places would be preferred that
+  /// it sees.
   double misfit(const SE2& reference_from_current) const;
 
  private:
