@@ -36,4 +36,9 @@ void LaserConstant::setStd(double std) {
   if (std * std != prior_variance_) *this = LaserConstant(std);
 }
 
+void LaserConstants::learn(const Match& match, const PreparedScan& scan) {
+  range_offset.add(match.range_offset, scan.range_offset);
+  sweep_duration.add(match.sweep_duration, scan.sweep.duration);
+}
+
 }  // namespace sckf

@@ -7,47 +7,20 @@
 #include <utility>
 
 #include "sckf_odometry/core/covariance.h"
+#include "sckf_odometry/pipeline/chi_squared.h"
 #include "sckf_odometry/pipeline/stopwatch.h"
 
 namespace sckf {
 
 namespace {
 
-void checkMethod(const std::string& method) {
-  if (makeFusionMethod(method, SE2(), Eigen::Matrix3d::Zero())) return;
-  std::string known;
-  for (const std::string& name : fusionMethodNames()) known += (known.empty() ? "" : ", ") + name;
-  throw std::invalid_argument("method is \"" + method + "\": expected one of " + known);
-}
-
-/// What is on has to be there: other methods have no states but the pose.
-void checkStates(const PipelineOptions& options) {
-  const auto refuse = [&options](const std::string& parameter, const std::string& expected) {
-    throw std::invalid_argument(parameter + ": expected " + expected + " with method \"" + options.method +
-                                "\"; only \"sckf_multi\" has states beside the pose");
-  };
-  if (options.method == "sckf_multi") return;
-  if (options.imu.gyro) refuse("use_imu is true", "false");
-  if (options.imu.orientation) refuse("use_imu_orientation is true", "false");
-  if (options.pose_updates.on) refuse("use_pose_updates is true", "false");
-  if (options.standstill.time > 0.0) refuse("standstill_time is " + std::to_string(options.standstill.time), "0");
-  if (options.landmarks.on()) refuse("landmarks is \"" + options.landmarks.use + "\"", "\"none\"");
-}
-
-void checkLasers(const PipelineOptions& options) {
-  if (options.lasers == 1 || (options.lasers > 1 && options.method == "sckf_multi")) return;
-  throw std::invalid_argument("there are " + std::to_string(options.lasers) + " lasers, and method is \"" +
-                              options.method + "\": expected one laser, or more and method \"sckf_multi\"");
-}
-
-void checkLandmarks(const PipelineOptions& options) {
-  if (!options.landmarks.only || options.landmarks.on()) return;
-  throw std::invalid_argument("landmarks_only is true: expected false with landmarks \"none\"");
-}
-
 void checkPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance) {
   const std::string problem = problemOf(odom_from_base, covariance);
   if (!problem.empty()) throw std::invalid_argument(problem);
+}
+
+DisplacementOptions displacementOptions(const PipelineOptions& options) {
+  return {options.matcher, options.reference, options.gate};
 }
 
 LaserConstants constantsOf(const PipelineOptions& options) {
@@ -58,20 +31,16 @@ LaserConstants constantsOf(const PipelineOptions& options) {
 
 ScanOdometry::ScanOdometry(const PipelineOptions& options, const SE2& odom_from_base, const Eigen::Matrix3d& covariance)
     : options_(options),
-      matcher_(options.matcher),
-      lasers_(options.lasers, {ReferencePolicy(options.reference), constantsOf(options), {}, std::nullopt}),
+      lasers_(options.lasers, {constantsOf(options), {}, std::nullopt}),
       odometry_(options.motion, options.odometry_timeout),
       imu_(options.imu.timeout),
       twist_(options.twist_window),
       start_(odom_from_base),
       start_covariance_(covariance),
       filter_twist_(options.twist_window),
+      displacements_(displacementOptions(options), options.lasers),
       landmarks_(options.landmarks) {
-  checkMethod(options.method);
-  checkStates(options);
-  modelledIncrement(SE2(), options.odometry_noise);  // throws if there is no such model
-  checkLasers(options);
-  checkLandmarks(options);
+  check(options);
   checkPose(odom_from_base, covariance);
 }
 
@@ -136,8 +105,9 @@ bool ScanOdometry::olderMayCome() const {
 ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   const Stopwatch stopwatch;
   const Stamp stamp = waiting.scan.stamp;
-  if (!odometry_.covers(stamp))
+  if (!odometry_.covers(stamp)) {
     return notUsed(stamp, waiting.laser, ScanOutcome::kNoOdometry, "older than the odometry at hand");
+  }
   Laser& laser = lasers_[waiting.laser];
   if (stamp < filter_stamp_ || laser.taken == stamp) {
     return notUsed(stamp, waiting.laser, ScanOutcome::kOutOfOrder, "not newer than the estimate");
@@ -156,23 +126,13 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   useHeading(report);  // (34)
   report.wheels_known = std::exchange(wheels_known_, true);
   report.scan = prepared(waiting, report.reason);
-  if (report.scan) claimLandmarks(report);
-  if (!report.scan) {
+  if (report.scan) {
+    correctBy(report);  // (16)-(23)
+  } else {
     report.outcome = ScanOutcome::kUnusable;
-  } else if (const auto reference = references_.newestOf(waiting.laser); !reference) {
-    report.new_reference = true;
-  } else if (!options_.landmarks.only) {
-    compareWithReference(*reference, report);  // (16)-(23)
   }
-  if (report.scan) useLandmarks(report);
   if (at_before) followScans(before, *at_before, report);
-  if (report.new_reference) {
-    compareWithOlderReferences(report);
-    if (laser.failures > 0) admitFailure(report);
-    allowForCommonErrors(report);
-    filter_->clone(report.scan->rangeVariances());  // (24)-(27)
-    references_.add(report.scan, report.laser, options_.reference.kept, *filter_);
-  }
+  if (report.new_reference) displacements_.becomeReference(report, *filter_);  // (24)-(27)
   report.estimate = estimate();
   report.in_map = inMap();
   report.calibration = filter_->calibration();
@@ -187,6 +147,16 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   return report;
 }
 
+void ScanOdometry::useHeading(ScanReport& report) {
+  if (!options_.imu.orientation) return;
+  const std::optional<double> yaw = imu_.takeYaw(report.stamp);
+  if (!yaw) return;
+  const double std = options_.imu.orientation_std;
+  const double bound = chiSquared(1, options_.gate.probability);
+  const bool contradicts = filter_->updateHeading(*yaw, std * std, bound) > bound;
+  report.heading = contradicts ? HeadingUse::kContradicts : HeadingUse::kUsed;
+}
+
 std::shared_ptr<const PreparedScan> ScanOdometry::prepared(const WaitingScans::Entry& waiting,
                                                            std::string& rejection) const {
   ScanOptions options = options_.scan;
@@ -195,9 +165,40 @@ std::shared_ptr<const PreparedScan> ScanOdometry::prepared(const WaitingScans::E
   return prepareScan(waiting.scan, waiting.base_from_laser, options, &rejection, motionDuring(waiting));
 }
 
+void ScanOdometry::correctBy(ScanReport& report) {
+  claimLandmarks(report);
+  if (!displacements_.hasReference(report.laser)) {
+    report.new_reference = true;
+  } else if (!options_.landmarks.only) {
+    displacements_.update(report, *filter_);
+    if (wasUsed(report.outcome)) lasers_[report.laser].constants.learn(report.match, *report.scan);
+  }
+  useLandmarks(report);
+}
+
+LandmarkStates* ScanOdometry::landmarkFilter() const {
+  return options_.landmarks.on() ? dynamic_cast<LandmarkStates*>(filter_.get()) : nullptr;
+}
+
+void ScanOdometry::claimLandmarks(ScanReport& report) {
+  const LandmarkStates* filter = landmarkFilter();
+  if (filter == nullptr) return;
+  report.scan = landmarks_.claim(report.scan, *filter, options_.scan.surface);
+}
+
+void ScanOdometry::useLandmarks(ScanReport& report) {
+  LandmarkStates* filter = landmarkFilter();
+  if (filter == nullptr) return;
+  report.landmarks_used = landmarks_.update(*filter);
+  report.landmarks = landmarks_.views(*filter);
+  if (!options_.landmarks.only || report.new_reference) return;
+  report.outcome = report.landmarks_used > 0 ? ScanOutcome::kUpdated : ScanOutcome::kNoMatch;
+  if (report.landmarks_used == 0) report.reason = "no landmark seen; displacements are not used";
+}
+
 std::optional<Estimate> ScanOdometry::latest() const {
   if (!latest_) return std::nullopt;
-  return Estimate{latest_stamp_, latest_->pose(), latest_->covariance(), twist_.twist()};
+  return Estimate{latest_->stamp, latest_->estimate.pose(), latest_->estimate.covariance(), twist_.twist()};
 }
 
 void ScanOdometry::setPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp) {
@@ -210,21 +211,10 @@ void ScanOdometry::setPose(const SE2& odom_from_base, const Eigen::Matrix3d& cov
 }
 
 void ScanOdometry::setOptions(const PipelineOptions& options) {
-  if (options.lasers != options_.lasers) {
-    throw std::invalid_argument("there are " + std::to_string(options.lasers) + " lasers: expected " +
-                                std::to_string(options_.lasers) + ", which only a new estimate can change");
-  }
-  if (options.method != options_.method) {
-    throw std::invalid_argument("method is \"" + options.method + "\": expected \"" + options_.method +
-                                "\", which only a new estimate can change");
-  }
-  modelledIncrement(SE2(), options.odometry_noise);  // throws if there is no such model
-  checkStates(options);
-  checkLandmarks(options);
+  checkChange(options_, options);
   options_ = options;
-  matcher_ = ScanMatcher(options.matcher);
+  displacements_.setOptions(displacementOptions(options));
   for (Laser& laser : lasers_) {
-    laser.policy.setOptions(options.reference);
     laser.constants.range_offset.setStd(options.range_offset_std);
     laser.constants.sweep_duration.setStd(options.sweep_duration_std);
   }
@@ -252,12 +242,10 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
   wheels_known_ = true;
   standstill_.interrupt();
   imu_.forgetTaken();
-  references_.clear();
+  displacements_ = DisplacementUpdates(displacementOptions(options_), options_.lasers);
   for (Laser& laser : lasers_) {
-    laser.policy = ReferencePolicy(options_.reference);
     laser.constants = constantsOf(options_);
     laser.taken.reset();
-    laser.failures = 0;
   }
   landmarks_ = Landmarks(options_.landmarks);
   carried_on_.reset();

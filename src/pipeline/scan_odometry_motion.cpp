@@ -46,7 +46,7 @@ void ScanOdometry::followAtADistance() {
   const Stamp last = odometry_.lastUpTo(too_old);
   takePoses(last);
   if (last > filter_stamp_) propagateTo(last);
-  if (carried_on_stamp_ < filter_stamp_) carryOn();
+  if (carried_on_->stamp < filter_stamp_) carryOn();
 }
 
 void ScanOdometry::propagateTo(Stamp stamp) {
@@ -82,27 +82,22 @@ bool ScanOdometry::imuTells(Stamp stamp) const {
 Stamp ScanOdometry::settled() const {
   const Stamp newest = odometry_.newest();
   if (imuTells(newest)) return newest;
-  return std::max(carried_on_stamp_, odometry_.lastUpTo(std::max(imu_.newest(), carried_on_stamp_)));
+  return std::max(carried_on_->stamp, odometry_.lastUpTo(std::max(imu_.newest(), carried_on_->stamp)));
 }
 
 void ScanOdometry::carryOn() {
-  if (!carried_on_ || carried_on_stamp_ < filter_stamp_) {
-    carried_on_.emplace(filter_->pose(), filter_->covariance());
-    carried_on_stamp_ = filter_stamp_;
-    carried_on_standstill_ = standstill_;
+  if (!carried_on_ || carried_on_->stamp < filter_stamp_) {
+    carried_on_ = CarriedOn{{filter_->pose(), filter_->covariance()}, filter_stamp_, standstill_};
   }
-  const auto carry = [this](DeadReckoning& estimate, Standstill& standstill, Stamp from, Stamp to) {
-    for (const OdometryBuffer::Step& step : odometry_.steps(from, to)) {
-      estimate.propagate(filter_->refined(increment(step, standstill)));
+  const auto carry = [this](CarriedOn& carried, Stamp to) {
+    for (const OdometryBuffer::Step& step : odometry_.steps(carried.stamp, to)) {
+      carried.estimate.propagate(filter_->refined(increment(step, carried.standstill)));
     }
+    carried.stamp = to;
   };
-  const Stamp settled = this->settled();
-  carry(*carried_on_, carried_on_standstill_, carried_on_stamp_, settled);
-  carried_on_stamp_ = settled;
+  carry(*carried_on_, settled());
   latest_ = carried_on_;
-  Standstill standstill = carried_on_standstill_;
-  latest_stamp_ = odometry_.newest();
-  carry(*latest_, standstill, settled, latest_stamp_);
+  carry(*latest_, odometry_.newest());
 }
 
 bool ScanOdometry::onScansAlone() const {

@@ -1,7 +1,7 @@
 // What is always the same about a laser and nobody tells.
 #pragma once
 
-#include "sckf_odometry/matching/displacement_estimation.h"
+#include "sckf_odometry/matching/scan_matcher.h"
 
 namespace sckf {
 
@@ -40,6 +40,9 @@ struct LaserConstants {
   /// the robot drives on, which turns a wall ahead of it, the more the nearer the wall: each displacement turns the
   /// robot a little, always to the same side.
   LaserConstant sweep_duration;
+
+  /// From a match of the scan that has been believed.
+  void learn(const Match& match, const PreparedScan& scan);
 };
 
 }  // namespace sckf

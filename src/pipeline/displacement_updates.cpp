@@ -1,0 +1,204 @@
+#include "sckf_odometry/pipeline/displacement_updates.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <sstream>
+
+#include "sckf_odometry/core/covariance.h"
+#include "sckf_odometry/pipeline/chi_squared.h"
+#include "sckf_odometry/pipeline/stopwatch.h"
+
+namespace sckf {
+
+namespace {
+
+std::string describe(const Innovation& innovation, double bound) {
+  std::ostringstream text;
+  text << "normalised innovation squared " << innovation.nis() << " exceeds " << bound << " ("
+       << innovation.residual.size() << " degrees of freedom)";
+  return text.str();
+}
+
+std::string describeDoubt(double agreement, double expected) {
+  std::ostringstream text;
+  text << "the scans agree by " << agreement << " with a reference that could not be placed itself: expected "
+       << expected;
+  return text.str();
+}
+
+/// What matches err by beyond range noise is partly the same from reference to reference, as the same surfaces are
+/// taken wrong in each: it adds up faster than errors that have nothing in common. Only so much of it is in the pose as
+/// the update has taken over from the displacement: nothing where the wheels know better. matching_common:
+/// ReferenceOptions::matching_common.
+void allowForCommonErrors(const ScanReport& report, double matching_common, FusionMethod& filter) {
+  if (!wasUsed(report.outcome) || !report.match.displacement) return;
+  const Displacement& z = *report.match.displacement;
+  const Displacement::MatrixDD share = Displacement::MatrixDD::Identity(z.dimension(), z.dimension()) -
+                                       z.covariance() * report.innovation->covariance.inverse();
+  Displacement::Matrix3D taken_over = z.fromObservable() * share;
+  taken_over.topRows<2>() = (z.reference_from_current.rotation().transpose() * taken_over.topRows<2>()).eval();
+  filter.loosen(matching_common * symmetric(taken_over * z.matching_noise * taken_over.transpose()));
+}
+
+}  // namespace
+
+DisplacementUpdates::DisplacementUpdates(const DisplacementOptions& options, std::size_t lasers)
+    : options_(options), matcher_(options.matcher), lasers_(lasers, Laser(options.reference)) {}
+
+void DisplacementUpdates::setOptions(const DisplacementOptions& options) {
+  options_ = options;
+  matcher_ = ScanMatcher(options.matcher);
+  for (Laser& laser : lasers_) laser.policy.setOptions(options.reference);
+}
+
+void DisplacementUpdates::update(ScanReport& report, FusionMethod& filter) {
+  const std::size_t clone = *references_.newestOf(report.laser);
+  const PreparedScan& reference = references_[clone];
+  report.reference_stamp = reference.stamp;
+  report.prediction = filter.predictedDisplacementFrom(clone);  // (16)
+  const Stopwatch stopwatch;
+  report.match = matcher_.match(reference, *report.scan, report.prediction);  // (1)
+  report.match_time = stopwatch.seconds();
+  bool used = false;
+  if (report.match.displacement) {
+    report.match.displacement->clone = clone;
+    used = fuse(report, filter);  // (17)-(23)
+  } else {
+    report.outcome = ScanOutcome::kNoMatch;
+    report.reason = toString(report.match.failure);
+  }
+  Laser& laser = lasers_[report.laser];
+  if (used) {
+    laser.place(report.stamp);
+  } else {
+    ++laser.failures;
+  }
+  const SE2 reference_from_scan = filter.predictedDisplacementFrom(clone).reference_from_current;
+  report.new_reference = laser.policy.replaces(reference_from_scan, report.match.overlap, used);
+}
+
+bool DisplacementUpdates::fuse(ScanReport& report, FusionMethod& filter) {
+  const Displacement& displacement = *report.match.displacement;
+  report.innovation = filter.innovation(displacement);
+  report.nis_bound = bound(displacement);
+  if (lasers_[report.laser].failures > 0 && report.match.agreement < options_.gate.doubtful_min_agreement) {
+    report.outcome = ScanOutcome::kGated;
+    report.reason = describeDoubt(report.match.agreement, options_.gate.doubtful_min_agreement);
+    return false;
+  }
+  report.outcome = ScanOutcome::kUpdated;
+  const auto contradicts = [&report] { return report.innovation->nis() > report.nis_bound; };
+  const bool slipped = contradicts() && looksLikeSlip(report);
+  if (slipped) {
+    allowForSlip(filter);
+    report.innovation = filter.innovation(displacement);
+    if (report.wheels_known) report.outcome = ScanOutcome::kSlip;
+  }
+  if (contradicts()) {
+    report.outcome = ScanOutcome::kGated;
+    report.reason = describe(*report.innovation, report.nis_bound);
+    return false;
+  }
+  filter.update(displacement, *report.innovation);
+  return true;
+}
+
+void DisplacementUpdates::becomeReference(ScanReport& report, FusionMethod& filter) {
+  if (report.outcome != ScanOutcome::kGated) compareWithOlder(report, filter);  // else what it says is not believed
+  if (lasers_[report.laser].failures > 0) admitFailure(report, filter);
+  allowForCommonErrors(report, options_.reference.matching_common, filter);
+  filter.clone(report.scan->rangeVariances());  // (24)-(27)
+  references_.add(report.scan, report.laser, options_.reference.kept, filter);
+}
+
+void DisplacementUpdates::compareWithOlder(ScanReport& report, FusionMethod& filter) {
+  for (const std::size_t clone : references_.worthComparing(report.laser, filter, options_.reference)) {
+    const std::optional<Displacement> displacement = displacementFrom(clone, report, filter);
+    if (!displacement) continue;
+    const Innovation innovation = filter.innovation(*displacement);
+    if (innovation.nis() > bound(*displacement)) continue;
+    filter.update(*displacement, innovation);
+    ++report.older_references;
+    lasers_[report.laser].place(report.stamp);
+  }
+}
+
+/// From an older reference; empty if there is none that is believed. One that is the first to place the scan decides
+/// alone, as on a slip.
+std::optional<Displacement> DisplacementUpdates::displacementFrom(std::size_t clone, const ScanReport& report,
+                                                                  const FusionMethod& filter) const {
+  const bool placed = lasers_[report.laser].failures == 0;
+  Match match = matchWithOlder(references_[clone], *report.scan, filter.predictedDisplacementFrom(clone), placed);
+  if (!match.displacement || match.overlap < options_.reference.older_min_overlap) return std::nullopt;
+  if (!placed && !outweighsWheels(match)) return std::nullopt;
+  Displacement& displacement = *match.displacement;
+  displacement.clone = clone;
+  displacement.matching_noise += (options_.reference.older_inflation - 1.0) * displacement.covariance();
+  return std::move(match.displacement);
+}
+
+/// Near the prediction; or, where that may be far off and the scan is none that fits nowhere, wherever the scans fall
+/// together without doubt.
+Match DisplacementUpdates::matchWithOlder(const PreparedScan& reference, const PreparedScan& scan,
+                                          const DisplacementPrediction& prediction, bool placed) const {
+  if (placed && isVague(prediction)) {
+    Match match = matcher_.match(reference, scan, prediction);
+    const bool agrees = match.agreement >= options_.gate.doubtful_min_agreement;
+    if (match.displacement && agrees && matchesWell(match)) return match;
+  }
+  return matcher_.matchNear(reference, scan, prediction);
+}
+
+/// Scan or wheels are wrong, and unless another laser tells nobody knows which: the estimate may be off by a slip. So
+/// it is at the scans after it until one is placed again, and a reference that could not be placed, nor any scan from
+/// it, is of no use.
+void DisplacementUpdates::admitFailure(const ScanReport& report, FusionMethod& filter) {
+  if (lasers_[report.laser].failures > 1) {
+    references_.forgetNewestOf(report.laser, filter);
+  } else if (options_.gate.trust_scans_on_slip && !othersTell(report.stamp)) {
+    allowForSlip(filter);
+  }
+}
+
+/// Whether scans of another laser have been placed lately, and none has failed since.
+bool DisplacementUpdates::othersTell(Stamp stamp) const {
+  const Stamp lately = stamp - Stamp(std::chrono::seconds(1));
+  return std::any_of(lasers_.begin(), lasers_.end(), [lately](const Laser& laser) {
+    return laser.failures == 0 && laser.placed && *laser.placed > lately;
+  });
+}
+
+void DisplacementUpdates::allowForSlip(FusionMethod& filter) const {
+  const Eigen::Vector3d std(options_.gate.slip_std_translation, options_.gate.slip_std_translation,
+                            options_.gate.slip_std_yaw);
+  filter.distrustWheels(std.cwiseAbs2().asDiagonal());
+}
+
+double DisplacementUpdates::bound(const Displacement& displacement) const {
+  return chiSquared(displacement.dimension(), options_.gate.probability);
+}
+
+/// Where the scans refute what the wheels tell these are wrong, and any match will do that has its place.
+bool DisplacementUpdates::looksLikeSlip(const ScanReport& report) const {
+  const Match& match = report.match;
+  if (outweighsWheels(match)) return true;
+  return options_.gate.trust_scans_on_slip && isPlaced(match) &&
+         matcher_.refutes(references_[match.displacement->clone], *report.scan,
+                          report.prediction.reference_from_current);
+}
+
+bool DisplacementUpdates::outweighsWheels(const Match& match) const {
+  return options_.gate.trust_scans_on_slip && matchesWell(match);
+}
+
+bool DisplacementUpdates::matchesWell(const Match& match) const {
+  return isPlaced(match) && match.misfit <= options_.gate.slip_max_misfit;
+}
+
+/// One wall lies on any other, however the robot is turned.
+bool DisplacementUpdates::isPlaced(const Match& match) const {
+  const Eigen::Index seen = match.displacement->dimension();
+  return seen == 3 || (seen == 2 && match.overlap >= options_.gate.slip_min_overlap);
+}
+
+}  // namespace sckf
