@@ -54,15 +54,16 @@ void AlignmentProblem::addSurfacePair(const Pair& pair, const RigidMotion& refer
   const auto j = static_cast<std::size_t>(pair.current);
   const Surface& surface = reference_.surface[i];
   const auto& [C, t] = reference_from_current;
-  const double incidence = surface.normal.dot(C * current_.points.ray[j]);
-  if (incidence > 0.0) return;  // the current scan would see the surface from behind
+  const Eigen::Vector2d ray = C * current_.points.ray[j];
+  if (surface.normal.dot(ray) > 0.0) return;  // the current scan would see the surface from behind
   const Surface& seen = current_.surface[j];
   if (seen.valid() && surface.normal.dot(C * seen.normal) < std::cos(options.max_normal_angle)) return;
 
   const double along = surface.tangent().dot(C * current_.points.point[j] + t - surface.centroid);
-  const double point_variance = square(reference_.range_noise * surface.normal.dot(reference_.points.ray[i]));
+  const double point_variance = varianceAcross(surface.normal, reference_.points.ray[i], reference_.range_noise);
   const double line_variance = point_variance * (1.0 / surface.size() + square(along) / surface.spread);
-  const double variance = square(current_.range_noise * incidence) + line_variance + square(options.surface_roughness);
+  const double variance =
+      varianceAcross(surface.normal, ray, current_.range_noise) + line_variance + square(options.surface_roughness);
   pairs_.push_back(pair);
   residuals_.push_back({pair.reference, pair.current, surface.normal, surface.centroid, &surface,
                         1.0 / std::sqrt(variance), (point_variance + square(kWallRoughness)) / surface.spread});

@@ -132,8 +132,15 @@ double addSurfaceDerivatives(const AlignmentProblem& problem, const Residual& re
   return together;
 }
 
+/// Points on no surface have two residuals, one after the other.
+inline void addPull(double weight, const Residual& residual, const ResidualTerms& t, std::vector<PointPull>& pulls) {
+  if (pulls.empty() || pulls.back().point != residual.current) pulls.push_back({residual.current});
+  pulls.back().by_position += weight * t.A * (residual.precision * residual.normal).transpose();
+}
+
 inline void addDerivatives(const AlignmentProblem& problem, const Residual& residual, const RigidMotion& x,
-                           const ResidualTerms& t, LossDerivatives& out) {
+                           LossDerivatives& out) {
+  const ResidualTerms t = problem.terms(residual, x);
   const double influence = problem.kernel().influence(t.e);
   const double slope = problem.kernel().slope(t.e);
   const Eigen::Matrix3d hessian = hessianOf(problem.kernel(), residual, t);
@@ -165,12 +172,7 @@ inline void addDerivatives(const AlignmentProblem& problem, const Residual& resi
   const Eigen::Vector2d by_duration = x.C * problem.current().bySweepDuration(c) -
                                       problem.reference().bySweepDuration(static_cast<std::size_t>(residual.reference));
   out.by_sweep_duration.add(w, residual, t, residual.normal.dot(by_duration));
-}
-
-/// Points on no surface have two residuals, one after the other.
-inline void addPull(double weight, const Residual& residual, const ResidualTerms& t, std::vector<PointPull>& pulls) {
-  if (pulls.empty() || pulls.back().point != residual.current) pulls.push_back({residual.current});
-  pulls.back().by_position += weight * t.A * (residual.precision * residual.normal).transpose();
+  addPull(w, residual, t, out.pulls);
 }
 
 LossDerivatives differentiate(const AlignmentProblem& problem, const RigidMotion& x, const EstimationOptions& options) {
@@ -182,9 +184,7 @@ LossDerivatives differentiate(const AlignmentProblem& problem, const RigidMotion
     const int its_block = beam / options.correlated_beams;
     if (out.blocks.empty() || its_block != block) out.blocks.emplace_back();
     block = its_block;
-    const ResidualTerms t = problem.terms(residual, x);
-    addDerivatives(problem, residual, x, t, out);
-    addPull(problem.kernel().weight(t.e), residual, t, out.pulls);
+    addDerivatives(problem, residual, x, out);
   }
   return out;
 }

@@ -20,8 +20,8 @@ bool endsLieOn(const Surface& surface, const ScannedPoints& points, double range
   constexpr double kFarthest = 3.0;  // std
   const auto lies_on = [&](int i) {
     const auto k = static_cast<std::size_t>(i);
-    const double noise = range_noise * surface.normal.dot(points.ray[k]);
-    const double variance = kWallRoughness * kWallRoughness + noise * noise;
+    const double variance =
+        kWallRoughness * kWallRoughness + varianceAcross(surface.normal, points.ray[k], range_noise);
     const double distance = distanceAcross(surface, points.point[k]);
     return distance * distance <= kFarthest * kFarthest * variance;  // square roots are slow
   };

@@ -32,6 +32,12 @@ struct Surface {
   Eigen::Vector2d tangent() const { return quarterTurn(normal); }
 };
 
+/// [m²] Of a point across a surface, by the noise of its range. ray: ∂point/∂range, as the normal of length 1.
+inline double varianceAcross(const Eigen::Vector2d& normal, const Eigen::Vector2d& ray, double range_noise) {
+  const double noise = range_noise * normal.dot(ray);
+  return noise * noise;
+}
+
 /// Points in the order of their beams, as a scan has them.
 struct ScannedPoints {
   std::vector<int> beam;               ///< index of the beam, increasing
