@@ -5,6 +5,9 @@ Every other scan of the log makes one estimate, the other ones another, and neit
 the three differ from each other tells how far each is off, where their errors are independent: the square of what the
 reference errs by is half of the squares of its distances from the two less that of theirs from each other. What the two
 estimates have in common, wheels and the laser's systematic errors, is counted to the reference: it errs by at most so much.
+
+With --other the two are the estimate by all scans and that of another program, which has to know as little of the
+reference; less is common to these.
 """
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import List
+from typing import List, Sequence
 
 import numpy as np
 import rosbag
@@ -24,11 +27,18 @@ from trajectory import DEFAULT_LENGTHS, DEFAULT_MAX_GAP, Trajectory, between, re
 
 
 @dataclass(frozen=True)
+class Rms:
+    """Over segments of one length."""
+    percent: float  # translation, of the length
+    deg_per_m: float
+
+
+@dataclass(frozen=True)
 class Share:
-    """Of segments of a length [m]: rms of the translation, in percent of it."""
-    length: float
-    of_halves: float  # by which the two estimates differ
-    of_reference: float  # of its own; 0 where it comes out negative
+    length: float  # [m]
+    first: Rms  # by which the first estimate is off the reference …
+    estimates: Rms  # … by which the two differ …
+    reference: Rms  # … and which are the reference's own; 0 where that comes out negative
 
 
 def every_other(bag: Path, output: Path, first: int, topic: str = "/scan") -> None:
@@ -41,9 +51,9 @@ def every_other(bag: Path, output: Path, first: int, topic: str = "/scan") -> No
                 out.write(name, message, time)
 
 
-def shares(reference: Trajectory, halves: List[Trajectory]) -> List[Share]:
-    """halves: the two estimates. A segment counts if both cover its ends."""
-    sampled = [sample(half, reference.stamps, DEFAULT_MAX_GAP) for half in halves]
+def shares(reference: Trajectory, estimates: Sequence[Trajectory]) -> List[Share]:
+    """Of two estimates. A segment counts if both cover its ends."""
+    sampled = [sample(estimate, reference.stamps, DEFAULT_MAX_GAP) for estimate in estimates]
     covered = sampled[0][1] & sampled[1][1]
     poses = [reference.poses, sampled[0][0], sampled[1][0]]
     result = []
@@ -54,31 +64,49 @@ def shares(reference: Trajectory, halves: List[Trajectory]) -> List[Share]:
         counts = covered[start] & covered[end]
         moved = [between(each[start[counts]], each[end[counts]]) for each in poses]
 
-        def mean_square(a: int, b: int, moved=moved, length=length) -> float:
-            apart = between(moved[a], moved[b])[:, :2] / length
-            return float((apart**2).sum(axis=1).mean())
+        def mean_squares(a: int, b: int, moved=moved, length=length) -> np.ndarray:
+            apart = between(moved[a], moved[b]) / length
+            return np.array([(apart[:, :2]**2).sum(axis=1).mean(), (apart[:, 2]**2).mean()])
 
-        own = 0.5 * (mean_square(0, 1) + mean_square(0, 2) - mean_square(1, 2))
-        result.append(Share(length, 100.0 * mean_square(1, 2)**0.5, 100.0 * max(0.0, own)**0.5))
+        def rms(squares: np.ndarray) -> Rms:
+            percent, deg_per_m = np.sqrt(np.maximum(squares, 0.0)) * (100.0, np.degrees(1.0))
+            return Rms(percent, deg_per_m)
+
+        first, second, apart = mean_squares(0, 1), mean_squares(0, 2), mean_squares(1, 2)
+        result.append(Share(length, rms(first), rms(apart), rms(0.5 * (first + second - apart))))
     return result
 
 
-def measured(bag: Path, tum: Path) -> List[Share]:
+def replayed(bag: Path) -> Trajectory:
+    with tempfile.TemporaryDirectory() as folder:
+        estimate = Path(folder) / "estimate.tum"
+        run("replay", bag, "--trajectory", estimate)
+        return read_tum(estimate)
+
+
+def by_halves(bag: Path, tum: Path) -> List[Share]:
     halves = []
     with tempfile.TemporaryDirectory() as folder:
+        half = Path(folder) / "half.bag"
         for first in (0, 1):
-            half, estimate = Path(folder) / "half.bag", Path(folder) / "half.tum"
             every_other(bag, half, first)
-            run("replay", half, "--trajectory", estimate)
-            halves.append(read_tum(estimate))
+            halves.append(replayed(half))
     return shares(read_tum(tum), halves)
+
+
+def by_another(bag: Path, tum: Path, other: Path) -> List[Share]:
+    return shares(read_tum(tum), [replayed(bag), read_tum(other)])
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for argument in ("bag", "reference"):
         parser.add_argument(argument, type=Path)
+    parser.add_argument("--other", type=Path, help="another program's estimate")
     options = parser.parse_args()
-    print(f"{'length':>8}{'halves differ by':>20}{'reference errs by':>20}")
-    for each in measured(options.bag, options.reference):
-        print(f"{each.length:6g} m{each.of_halves:18.2f} %{each.of_reference:18.2f} %")
+    table = (by_another(options.bag, options.reference, options.other)
+             if options.other else by_halves(options.bag, options.reference))
+    print(f"rms{'estimate off reference':>31}{'estimates differ':>26}{'reference errs':>26}")
+    for share in table:
+        cells = [f"{each.percent:.2f} %, {each.deg_per_m:.3f} °/m" for each in (share.first, share.estimates, share.reference)]
+        print(f"{share.length:6g} m" + "".join(f"{cell:>26}" for cell in cells))

@@ -22,7 +22,7 @@ from backwards import turn_round  # noqa: E402
 from crowd import crowd  # noqa: E402
 from logs import MALAGA, installed, recorded, run, simulated  # noqa: E402
 from recording import halved, read_recording  # noqa: E402
-from reference_noise import measured, shares  # noqa: E402
+from reference_noise import by_halves, shares  # noqa: E402
 from revisit import closure, find_revisits  # noqa: E402
 from trajectory import Trajectory, between, drift, read_tum, sample  # noqa: E402
 from turned_laser import turn_laser  # noqa: E402
@@ -140,10 +140,10 @@ class DriftTest(unittest.TestCase):
     def test_on_freiburg_the_reference_errs_by_more_than_the_estimate(self) -> None:
         """Even where the estimate has half of the scans."""
         bag = recorded("freiburg-079")
-        for each in measured(bag, bag.with_suffix(".tum")):
-            print(f"\nfreiburg-079, {each.length:g} m: halves differ by {each.of_halves:.2f} %, the reference errs by "
-                  f"{each.of_reference:.2f} %")
-            self.assertLess(each.of_halves / np.sqrt(2.0), each.of_reference)
+        for each in by_halves(bag, bag.with_suffix(".tum")):
+            print(f"\nfreiburg-079, {each.length:g} m: halves differ by {each.estimates.percent:.2f} %, the reference "
+                  f"errs by {each.reference.percent:.2f} %")
+            self.assertLess(each.estimates.percent / np.sqrt(2.0), each.reference.percent)
 
     def check_worse(self, log: str, told: Told, percent: float, deg_per_m: float) -> None:
         bag = recorded(log)
@@ -230,20 +230,36 @@ class DriftTest(unittest.TestCase):
 
 class ReferenceNoiseTest(unittest.TestCase):
 
-    def test_three_errors_are_told_apart(self) -> None:
-        """Along a straight way, each pose off by so much in x and in y, and none in yaw."""
+    @staticmethod
+    def straight_ways(axes: Sequence[int]) -> List[Trajectory]:
+        """Poses along a straight way, off by 0.02, 0.01 and 0.01 m or rad (std) in these of x, y and yaw."""
         random = np.random.default_rng(1)
         truth = np.column_stack([np.arange(0.0, 1000.0, 0.25), np.zeros(4000), np.zeros(4000)])
+        ways = []
+        for std in (0.02, 0.01, 0.01):
+            poses = truth.copy()
+            poses[:, axes] += random.normal(0.0, std, (4000, len(axes)))
+            ways.append(Trajectory(np.arange(4000.0) * 0.1, poses))
+        return ways
 
-        def off_by(std: float) -> Trajectory:
-            noise = np.column_stack([random.normal(0.0, std, (4000, 2)), np.zeros(4000)])
-            return Trajectory(np.arange(4000.0) * 0.1, truth + noise)
+    def check(self, measured: float, expected: float) -> None:
+        self.assertAlmostEqual(measured / expected, 1.0, delta=0.05)
 
-        reference, halves = off_by(0.02), [off_by(0.01), off_by(0.01)]
-        for each in shares(reference, halves):
+    def test_three_errors_are_told_apart(self) -> None:
+        reference, *estimates = self.straight_ways([0, 1])
+        for each in shares(reference, estimates):
             at_ends = 100.0 * np.sqrt(2.0 * 2.0) / each.length  # of an std of each axis, in percent
-            self.assertAlmostEqual(each.of_reference / (at_ends * 0.02), 1.0, delta=0.05)
-            self.assertAlmostEqual(each.of_halves / (at_ends * 0.01 * np.sqrt(2.0)), 1.0, delta=0.05)
+            self.check(each.first.percent, at_ends * np.hypot(0.02, 0.01))
+            self.check(each.estimates.percent, at_ends * 0.01 * np.sqrt(2.0))
+            self.check(each.reference.percent, at_ends * 0.02)
+
+    def test_so_are_those_of_the_yaw(self) -> None:
+        reference, *estimates = self.straight_ways([2])
+        for each in shares(reference, estimates):
+            at_ends = np.degrees(np.sqrt(2.0)) / each.length
+            self.check(each.first.deg_per_m, at_ends * np.hypot(0.02, 0.01))
+            self.check(each.estimates.deg_per_m, at_ends * 0.01 * np.sqrt(2.0))
+            self.check(each.reference.deg_per_m, at_ends * 0.02)
 
 
 if __name__ == "__main__":
