@@ -28,6 +28,7 @@ START = 1000.0  # [s]
 SPEED = 0.5  # [m/s]
 ODOMETRY = 4  # messages from scan to scan
 MOUNT = Mount(x=0.1, z=0.3)
+SEED = 7
 NO_RETURN = 81.9  # [m] as CARMEN's lasers say it
 
 
@@ -143,9 +144,9 @@ def scan_message(stamp: rospy.Time, laser: Laser, ranges: np.ndarray) -> LaserSc
 
 
 def simulate(place_name: str, bag: Path, tum: Path, wheels: str = "good", step: float = 0.5, laser: Laser = Laser(),
-             somebody: Optional[str] = None) -> None:
-    """Of each place always the same. Step: from scan to scan [m]. Somebody: who walks ahead or towards the robot."""
-    draws = np.random.default_rng(7)
+             somebody: Optional[str] = None, seed: int = SEED) -> None:
+    """With the same seed always the same. Step: from scan to scan [m]. Somebody: who walks ahead or towards the robot."""
+    draws = np.random.default_rng(seed)
     place = PLACES[place_name](draws)
     poses = drive(place.way, step)
     truth = Trajectory(START + step / SPEED * np.arange(len(poses)), poses)
@@ -180,9 +181,11 @@ def main() -> None:
     parser.add_argument("--beams", type=int, default=181, help="of the laser, over half a turn (default: 181)")
     parser.add_argument("--reach", type=float, default=80.0, help="of the laser [m] (default: 80)")
     parser.add_argument("--somebody", choices=("ahead", "towards"), help="walks along the robot's way")
+    parser.add_argument("--seed", type=int, default=SEED,
+                        help="of all that is drawn: where doors, trees and pictures are, noise (default: %(default)s)")
     options = parser.parse_args()
     simulate(options.place, options.output_bag, options.output_tum, options.wheels, options.step,
-             Laser(options.beams, options.reach), options.somebody)
+             Laser(options.beams, options.reach), options.somebody, options.seed)
 
 
 if __name__ == "__main__":
