@@ -5,11 +5,9 @@
 #include <algorithm>
 #include <boost/program_options.hpp>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <deque>
 #include <iostream>
-#include <map>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -22,6 +20,7 @@
 #include "sckf_odometry/ros/range_message.h"
 #include "sckf_odometry/ros/tf_input.h"
 #include "sckf_odometry/tools/progress_bar.h"
+#include "sckf_odometry/tools/replay_statistics.h"
 #include "sckf_odometry/tools/replay_tables.h"
 
 namespace sckf {
@@ -41,68 +40,6 @@ struct Arguments {
   std::string map_trajectory;
   double start = 0.0;     ///< [s] after the bag's begin
   double duration = 0.0;  ///< [s], 0: to its end
-};
-
-/// Times of the scans' processing, and what became of them.
-class Statistics {
- public:
-  void add(const ScanReport& report, double time) {
-    ++outcomes_[report.outcome];
-    ++deskewing_[report.deskewing];
-    times_.push_back(time);
-    if (report.new_reference) reference_times_.push_back(time);
-    older_references_ += static_cast<std::size_t>(report.older_references);
-    landmarks_used_ += static_cast<std::size_t>(report.landmarks_used);
-    constants_ = report.laser_constants;
-    most_landmarks_ = std::max(most_landmarks_, report.landmarks.size());
-  }
-
-  void print(double log_duration, double wall_time) {
-    std::printf("%zu scans", times_.size());
-    for (const auto& [outcome, count] : outcomes_) std::printf(", %zu %s", count, toString(outcome).c_str());
-    for (const auto& [deskewing, count] : deskewing_) {
-      if (deskewing != Deskewing::kOff) std::printf(", %zu %s", count, toString(deskewing).c_str());
-    }
-    std::printf("\n");
-    if (times_.empty()) return;
-    if (most_landmarks_ > 0) {
-      std::printf("landmarks seen %zu times, at most %zu in the state\n", landmarks_used_, most_landmarks_);
-    }
-    if (older_references_ > 0) {
-      std::printf("older references used %zu times, by %zu scans that became one\n", older_references_,
-                  reference_times_.size());
-    }
-    printConstant("range offset", constants_.range_offset, "m");
-    printConstant("sweep duration", constants_.sweep_duration, "s");
-    printTimes("time of a scan", times_);
-    printTimes("time of a scan that became a reference", reference_times_);
-    std::printf("%.1f s of log in %.2f s: %.0f times real time\n", log_duration, wall_time, log_duration / wall_time);
-  }
-
- private:
-  static void printConstant(const char* what, const LaserConstant& constant, const char* unit) {
-    if (constant.variance() == 0.0) return;
-    std::printf("%s %.4f +- %.4f %s\n", what, constant.value(), std::sqrt(constant.variance()), unit);
-  }
-
-  static void printTimes(const char* what, std::vector<double>& times) {
-    if (times.empty()) return;
-    std::sort(times.begin(), times.end());
-    const auto quantile = [&times](double q) {
-      return 1e3 * times[static_cast<std::size_t>(q * static_cast<double>(times.size() - 1))];
-    };
-    std::printf("%s: median %.3f ms, 95 %% below %.3f ms, longest %.3f ms\n", what, quantile(0.5), quantile(0.95),
-                quantile(1.0));
-  }
-
-  std::map<ScanOutcome, std::size_t> outcomes_;
-  std::map<Deskewing, std::size_t> deskewing_;
-  std::size_t older_references_ = 0;
-  LaserConstants constants_;  // of the last scan's laser
-  std::size_t landmarks_used_ = 0;
-  std::size_t most_landmarks_ = 0;
-  std::vector<double> times_;            // [s] of each scan …
-  std::vector<double> reference_times_;  // [s] … and of those that became a reference
 };
 
 class Replay {
@@ -263,7 +200,7 @@ class Replay {
   OutputFile trajectory_;
   OutputFile map_trajectory_;
   OutputFile csv_;
-  Statistics statistics_;
+  ReplayStatistics statistics_;
   struct Waiting {
     std::size_t laser;
     RangeMessage message;
