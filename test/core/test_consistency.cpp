@@ -15,6 +15,7 @@
 #include "core/random_inputs.h"
 #include "sckf_odometry/core/fusion_method.h"
 #include "sckf_odometry/core/odometry_model.h"
+#include "sckf_odometry/experiments/other_measurements.h"
 #include "sckf_odometry/experiments/room_simulation.h"
 
 namespace sckf {
@@ -46,15 +47,6 @@ const World kCorridor{"Corridor", {{{0, 1}, 2.0}, {{0, -1}, 2.0}}, 2, SE2(), 1.0
 SE2 motion(const World& world, int increment) {
   const double swing = 1.0 - world.wave + world.wave * std::cos(0.1 * increment);
   return {0.06, 0.0, 0.024 * swing};
-}
-
-OdometryNoise wheelNoise() {
-  OdometryNoise noise;
-  noise.translation_per_meter = 0.05;
-  noise.translation_per_radian = 0.02;
-  noise.yaw_per_meter = 0.05;
-  noise.yaw_per_radian = 0.10;
-  return noise;
 }
 
 struct Experiment {
@@ -100,7 +92,7 @@ void run(const Experiment& experiment, RandomInputs& random, Statistics& sums) {
   for (int scan = 1; scan <= kScans; ++scan) {
     for (int i = 0; i < kIncrementsPerScan; ++i) {
       const SE2 moved = motion(experiment.world, kIncrementsPerScan * scan + i);
-      const Eigen::Matrix3d Q = modelledIncrement(moved, wheelNoise()).covariance;
+      const Eigen::Matrix3d Q = modelledIncrement(moved, simulatedWheelNoise()).covariance;
       filter->propagate({corrected(moved, random.drawnFrom(Q)), Q});
       odom_from_base = compose(odom_from_base, moved);
     }
