@@ -36,17 +36,16 @@ class Search {
         options_(options) {}
 
   /// From the predicted displacement; if the scans do not fall together there, from where CICP finds that they do, from
-  /// there and from the best of other yaws; and if they still do not by far, from wherever they may.
+  /// there and from the best of other yaws; and if they still do not by far, backwards, and from wherever they may.
   std::optional<Alignment> run() const {
     std::optional<Alignment> best = runNear();
     if (best && !suspicious(*best)) return best;
     keepBetter(best, align(icp(mean_), options_.icp_pair_distance));
     if (best && !suspicious(*best)) return best;
     if (options_.search_yaw_steps > 0) keepBetter(best, align(icp(bestOtherYaw()), options_.icp_pair_distance));
-    if (options_.wide_search.yaw > 0.0 && !(best && fits(*best))) {
-      std::optional<Alignment> far = farAway();
-      if (far && (!best || better(*far, *best))) best.emplace(std::move(*far));
-    }
+    if (options_.wide_search.yaw <= 0.0) return best;
+    if (!best || !fits(*best)) takeIfBetter(best, backwards());
+    if (!best || !fits(*best)) takeIfBetter(best, farAway());
     return best;
   }
 
@@ -94,6 +93,16 @@ class Search {
       }
     }
     return best;
+  }
+
+  /// Where the wheels tell how far the robot went and not which way: of some the encoders lose the sign when it
+  /// reverses. Only if the scans fall together there at once, as well as they would at a right prediction.
+  std::optional<Alignment> backwards() const {
+    Search search = *this;
+    search.mean_ = SE2(-mean_.x, -mean_.y, mean_.yaw);
+    std::optional<Alignment> found = search.runNear();
+    if (found && search.suspicious(*found)) found.reset();
+    return found;
   }
 
   /// Wherever the scans may fall together, if the wheels have slipped: they tell hardly more then than the bounds.
@@ -182,6 +191,10 @@ class Search {
 
   static void keepBetter(std::optional<Alignment>& best, std::optional<Alignment> other) {
     if (other && (!best || cost(*other) < cost(*best))) best.emplace(std::move(*other));
+  }
+
+  void takeIfBetter(std::optional<Alignment>& best, std::optional<Alignment> far) const {
+    if (far && (!best || better(*far, *best))) best.emplace(std::move(*far));
   }
 
   /// Whether a place far from the prediction is better than what else there is: than one near the prediction if it

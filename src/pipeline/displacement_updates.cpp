@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include "sckf_odometry/core/covariance.h"
@@ -90,7 +91,7 @@ bool DisplacementUpdates::fuse(ScanReport& report, FusionMethod& filter) {
   const auto contradicts = [&report] { return report.innovation->nis() > report.nis_bound; };
   const bool slipped = contradicts() && looksLikeSlip(report);
   if (slipped) {
-    allowForSlip(filter);
+    allowForSlip(filter, report.prediction.reference_from_current.translation().norm());
     report.innovation = filter.innovation(displacement);
     if (report.wheels_known) report.outcome = ScanOutcome::kSlip;
   }
@@ -156,7 +157,7 @@ void DisplacementUpdates::admitFailure(const ScanReport& report, FusionMethod& f
   if (lasers_[report.laser].failures > 1) {
     references_.forgetNewestOf(report.laser, filter);
   } else if (options_.gate.trust_scans_on_slip && !othersTell(report.stamp)) {
-    allowForSlip(filter);
+    allowForSlip(filter, 0.0);
   }
 }
 
@@ -168,9 +169,10 @@ bool DisplacementUpdates::othersTell(Stamp stamp) const {
   });
 }
 
-void DisplacementUpdates::allowForSlip(FusionMethod& filter) const {
-  const Eigen::Vector3d std(options_.gate.slip_std_translation, options_.gate.slip_std_translation,
-                            options_.gate.slip_std_yaw);
+/// way: [m] what they tell that is certainly not true.
+void DisplacementUpdates::allowForSlip(FusionMethod& filter, double way) const {
+  const double std_translation = std::hypot(options_.gate.slip_std_translation, way);
+  const Eigen::Vector3d std(std_translation, std_translation, options_.gate.slip_std_yaw);
   filter.distrustWheels(std.cwiseAbs2().asDiagonal());
 }
 

@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import List, Sequence
 
 import numpy as np
-import rosbag
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
 from logs import run  # noqa: E402
+from thinned import thin  # noqa: E402
 from trajectory import DEFAULT_LENGTHS, DEFAULT_MAX_GAP, Trajectory, between, read_tum, sample  # noqa: E402
 
 
@@ -39,16 +39,6 @@ class Share:
     first: Rms  # by which the first estimate is off the reference …
     estimates: Rms  # … by which the two differ …
     reference: Rms  # … and which are the reference's own; 0 where that comes out negative
-
-
-def every_other(bag: Path, output: Path, first: int, topic: str = "/scan") -> None:
-    """Writes the bag with every second scan, from the one with that number on."""
-    scans = 0
-    with rosbag.Bag(str(bag)) as source, rosbag.Bag(str(output), "w") as out:
-        for name, message, time in source.read_messages():
-            scans += name == topic
-            if name != topic or scans % 2 != first % 2:
-                out.write(name, message, time)
 
 
 def shares(reference: Trajectory, estimates: Sequence[Trajectory]) -> List[Share]:
@@ -89,7 +79,7 @@ def by_halves(bag: Path, tum: Path) -> List[Share]:
     with tempfile.TemporaryDirectory() as folder:
         half = Path(folder) / "half.bag"
         for first in (0, 1):
-            every_other(bag, half, first)
+            thin(bag, half, 2, first)
             halves.append(replayed(half))
     return shares(read_tum(tum), halves)
 

@@ -25,6 +25,7 @@ from recording import halved, read_recording  # noqa: E402
 from reference_noise import by_halves, shares  # noqa: E402
 from revisit import closure, find_revisits  # noqa: E402
 from trajectory import Trajectory, between, drift, read_tum, sample  # noqa: E402
+from thinned import thin, thin_reference  # noqa: E402
 from turned_laser import turn_laser  # noqa: E402
 from worse_wheels import Told, freezing, slipping, worsen  # noqa: E402
 
@@ -136,6 +137,17 @@ class DriftTest(unittest.TestCase):
         self.check_backwards("intel", 1.1, 0.085)
         self.check_backwards("aces", 1.65, 0.085)
         self.check_backwards("freiburg-079", 1.3, 0.12)
+
+    def check_thinned(self, log: str, every: int, percent: float, deg_per_m: float) -> None:
+        bag, tum = self.path("thinned.bag"), self.path("thinned.tum")
+        thin_reference(recorded(log).with_suffix(".tum"), tum, thin(recorded(log), bag, every))
+        self.check_drift(f"{log}, 1 of {every} scans", bag, tum, percent, deg_per_m)
+
+    def test_scans_that_are_far_apart(self) -> None:
+        """1.1 m and 36 degrees, 1.5 m and 30 degrees; and 0.7 m where the wheels are wrong by twice that when reversing."""
+        self.check_thinned("intel", 2, 0.95, 0.085)
+        self.check_thinned("aces", 2, 1.3, 0.08)
+        self.check_thinned("freiburg-079", 8, 1.1, 0.1)
 
     def test_on_freiburg_the_reference_errs_by_more_than_the_estimate(self) -> None:
         """Even where the estimate has half of the scans."""

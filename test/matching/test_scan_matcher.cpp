@@ -58,6 +58,18 @@ TEST(ScanMatcher, FindsAYawThatTheWheelsMissed) {
   EXPECT_NEAR(match.displacement->reference_from_current.yaw, 0.45, 2e-3);
 }
 
+/// Farther from the prediction than is searched.
+TEST(ScanMatcher, FindsARobotThatReversesWhereTheWheelsLoseTheSign) {
+  for (const double way : {0.9, 1.2}) {
+    const SE2 back(-way, 0.02, 0.1);
+    const DisplacementPrediction forth{SE2(way, 0.0, 0.12), Eigen::Vector3d(0.05, 0.05, 0.02).cwiseAbs2().asDiagonal()};
+    const Match match = matchIn(room(), SE2(0.6, 0.2, 0.3), back, SimulatedLaser(), forth);
+    ASSERT_TRUE(match.displacement) << way << ": " << toString(match.failure);
+    const Eigen::Vector3d e = error(match.displacement->reference_from_current, back);
+    EXPECT_LT(e.cwiseAbs().maxCoeff(), 2e-3) << way << ": error " << e.transpose();
+  }
+}
+
 TEST(ScanMatcher, AMountAheadGivesTheDisplacementOfTheBase) {
   SimulatedLaser laser;
   laser.base_from_laser.translation() << 0.5, 0.1, 0.3;

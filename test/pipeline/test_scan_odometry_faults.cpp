@@ -443,6 +443,29 @@ TEST(ScanOdometryFaults, WheelsThatCanSlipInYawAloneLeaveTheEstimateSound) {
   EXPECT_LT(std::abs(error(driven.reports.back().estimate.value().odom_from_base, drive.truth(2807)).z()), 0.02);
 }
 
+/// By 2.4 m from scan to scan.
+TEST(ScanOdometryFaults, WheelsThatLoseTheSignWhereTheRobotReversesDoNotLeadItAstray) {
+  Wheels wheels;
+  wheels.scale = 1.0;
+  wheels.yaw_per_meter = 0.0;
+  wheels.spin = -1.0;
+  wheels.spin_from = 2000;
+  wheels.spin_to = 6000;
+  const SimulatedDrive drive(wheels, 6000, room(),
+                             [](double t) { return SE2(t < 2.0 ? 0.6 * t - 0.2 : 1.0 - 0.6 * (t - 2.0), 0.1, 0.2); });
+  const auto lastError = [&drive](const PipelineOptions& options) {
+    Driven driven(drive, options);
+    driven.odometry(0);
+    driven.scan(0);
+    driven.run(0, 5980, 2000);
+    return error(driven.reports.back().estimate.value().odom_from_base, drive.truth(4007));
+  };
+  PipelineOptions options;
+  EXPECT_LT(lastError(options).head<2>().norm(), 0.04) << lastError(options).transpose();
+  options.matcher.wide_search.yaw = 0.0;
+  EXPECT_GT(lastError(options).head<2>().norm(), 1.0) << "it is no test";
+}
+
 TEST(ScanOdometryFaults, WhereTheWheelsSlipTheScansAreFollowed) {
   const SimulatedDrive drive = slippingDrive();
   Driven driven = begun(drive);

@@ -16,7 +16,7 @@ namespace sckf {
 struct GateOptions {
   double probability = 0.999;         ///< χ² gate: an innovation less likely than 1 − this contradicts
   bool trust_scans_on_slip = true;    ///< where the scans match well, put the contradiction down to the wheels
-  double slip_std_translation = 0.5;  ///< [m] what the wheels may have been wrong by in such an interval …
+  double slip_std_translation = 0.5;  ///< [m] by what, beside all their way, the wheels may be wrong then …
   double slip_std_yaw = 0.5;          ///< [rad] … and in yaw
   double slip_max_misfit = 1.3;       ///< scans match well if Match::misfit is at most this …
   double slip_min_overlap = 0.6;  ///< … and where they see two directions only, this share of the points has a partner
@@ -65,7 +65,7 @@ class DisplacementUpdates {
   };
 
   bool fuse(ScanReport& report, FusionMethod& filter);
-  void allowForSlip(FusionMethod& filter) const;
+  void allowForSlip(FusionMethod& filter, double way) const;
   void admitFailure(const ScanReport& report, FusionMethod& filter);
   bool othersTell(Stamp stamp) const;
   void compareWithOlder(ScanReport& report, FusionMethod& filter);

@@ -1,0 +1,46 @@
+#!/usr/bin/python3
+"""Writes a log with every n-th scan only, and its reference at these."""
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+import rosbag
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
+from trajectory import STAMP_TOLERANCE, Trajectory, read_tum, write_tum  # noqa: E402
+
+
+def thin(bag: Path, output: Path, every: int, first: int = 0, topic: str = "/scan") -> np.ndarray:
+    """From the scan with the number `first` on. Returns the stamps of those that are left [s]."""
+    stamps = []
+    scans = 0
+    with rosbag.Bag(str(bag)) as source, rosbag.Bag(str(output), "w") as out:
+        for name, message, time in source.read_messages():
+            if name == topic:
+                scans += 1
+                if (scans - 1) % every != first:
+                    continue
+                stamps.append(message.header.stamp.to_sec())
+            out.write(name, message, time)
+    return np.array(stamps)
+
+
+def thin_reference(tum: Path, output: Path, stamps: np.ndarray) -> None:
+    """stamps: of the scans that are left, in the order of time [s]."""
+    reference = read_tum(tum)
+    after = np.searchsorted(stamps, reference.stamps).clip(1, len(stamps) - 1)
+    away = np.minimum(abs(stamps[after] - reference.stamps), abs(stamps[after - 1] - reference.stamps))
+    left = away <= STAMP_TOLERANCE
+    write_tum(output, Trajectory(reference.stamps[left], reference.poses[left]))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    for argument in ("bag", "tum", "output_bag", "output_tum"):
+        parser.add_argument(argument, type=Path)
+    parser.add_argument("every", type=int, help="n: 2 leaves every other scan")
+    options = parser.parse_args()
+    thin_reference(options.tum, options.output_tum, thin(options.bag, options.output_bag, options.every))
