@@ -36,16 +36,18 @@ class Search {
         options_(options) {}
 
   /// From the predicted displacement; if the scans do not fall together there, from where CICP finds that they do, from
-  /// there and from the best of other yaws; and if they still do not by far, backwards, and from wherever they may.
+  /// there and from the best of other yaws; and if they still do not by far, backwards, and from wherever they may, at
+  /// first not too far from the prediction.
   std::optional<Alignment> run() const {
     std::optional<Alignment> best = runNear();
     if (best && !suspicious(*best)) return best;
     keepBetter(best, align(icp(mean_), options_.icp_pair_distance));
     if (best && !suspicious(*best)) return best;
     if (options_.search_yaw_steps > 0) keepBetter(best, align(icp(bestOtherYaw()), options_.icp_pair_distance));
-    if (options_.wide_search.yaw <= 0.0) return best;
-    if (!best || !fits(*best)) takeIfBetter(best, backwards());
-    if (!best || !fits(*best)) takeIfBetter(best, farAway());
+    if (options_.wide_search.yaw <= 0.0 || fits(best)) return best;
+    takeIfBetter(best, backwards());
+    if (!fits(best)) takeIfBetter(best, farAway(kPrice));
+    if (!best || agreesTooLittle(*best)) takeIfBetter(best, anywhere());
     return best;
   }
 
@@ -70,6 +72,7 @@ class Search {
   static constexpr double kRough = 2.0;          // residuals of twice what noise explains
   static constexpr double kSurprise = 16.0;      // four sigma from the prior
   static constexpr double kGain = 0.3;           // misfit: for less the prior is not given up
+  static constexpr double kPrice = 0.14;         // of a place far from the prediction
   static constexpr double kAgreesBetter = 0.05;  // for less one place far from the prior is not left for another
 
   static Eigen::Matrix3d priorFloor(const MatcherOptions& options) {
@@ -106,15 +109,25 @@ class Search {
   }
 
   /// Wherever the scans may fall together, if the wheels have slipped: they tell hardly more then than the bounds.
-  std::optional<Alignment> farAway() const {
+  /// price: see widelySearched().
+  std::optional<Alignment> farAway(double price) const {
     const Eigen::Vector3d bounds(options_.wide_search.translation, options_.wide_search.translation,
                                  options_.wide_search.yaw);
     const Search search(reference_, current_, {mean_, bounds.cwiseAbs2().asDiagonal()}, options_);
     std::optional<Alignment> best;
-    for (const SE2& place : widelySearched(reference_, current_, mean_, options_.wide_search)) {
+    for (const SE2& place : widelySearched(reference_, current_, mean_, options_.wide_search, price)) {
       keepBetter(best, search.align(search.icp(place), options_.icp_pair_distance));
     }
     return best;
+  }
+
+  /// However far, as after a turn in which the wheels have told nothing and half of what was in view has gone out of
+  /// it. Only if the scans fall together there as well as they would at a right prediction.
+  std::optional<Alignment> anywhere() const {
+    constexpr double kFallsTogether = 0.7;  // misfit: nine of ten right matches have less
+    std::optional<Alignment> found = farAway(0.0);
+    if (found && (suspicious(*found) || found->misfit() > kFallsTogether)) found.reset();
+    return found;
   }
 
   SE2 icp(const SE2& start) const {
@@ -205,13 +218,17 @@ class Search {
     return far.misfit() < best.misfit() && far.problem.agreement() > best.problem.agreement() + kAgreesBetter;
   }
 
-  bool fits(const Alignment& alignment) const {
-    return alignment.problem.agreement() >= options_.wide_search_below_agreement && alignment.surprise <= kSurprise;
+  bool fits(const std::optional<Alignment>& alignment) const {
+    return alignment && alignment->surprise <= kSurprise &&
+           alignment->problem.agreement() >= options_.wide_search_below_agreement;
+  }
+
+  bool agreesTooLittle(const Alignment& alignment) const {
+    return alignment.problem.agreement() < options_.search_below_agreement;
   }
 
   bool suspicious(const Alignment& alignment) const {
-    return alignment.problem.agreement() < options_.search_below_agreement || alignment.problem.scale() > kRough ||
-           alignment.surprise > kSurprise;
+    return agreesTooLittle(alignment) || alignment.problem.scale() > kRough || alignment.surprise > kSurprise;
   }
 
   const PreparedScan& reference_;

@@ -88,13 +88,14 @@ std::vector<Eigen::Vector2d> evenlyTaken(const std::vector<Eigen::Vector2d>& poi
 class WideSearch {
  public:
   WideSearch(const PreparedScan& reference, const PreparedScan& current, const SE2& predicted,
-             const WideSearchOptions& options)
+             const WideSearchOptions& options, double price)
       : by_cell_(reference.points.point, 1),
         by_block_(reference.points.point, kBlock),
         points_(evenlyTaken(current.points.point)),
         predicted_(predicted),
         turns_(static_cast<int>(options.yaw / kYawStep)),
         steps_(static_cast<int>(options.translation / kCell)),
+        price_(price),
         cells_(points_.size()) {}
 
   /// The best places of those turns at which it is better than at the turns beside, the best first.
@@ -147,11 +148,9 @@ class WideSearch {
     }
   }
 
-  /// Of all points, so many must tell against the prediction for a place that is 1 m, or 1 rad, from it.
   double priceOf(int turn, int column, int row) const {
-    constexpr double kPrice = 0.14;
     const double away = kCell * kCell * (column * column + row * row) + kYawStep * kYawStep * turn * turn;
-    return kPrice * away * NearnessGrid::kOnIt * static_cast<double>(points_.size());
+    return price_ * away * NearnessGrid::kOnIt * static_cast<double>(points_.size());
   }
 
   /// Of the cells of a block along an axis.
@@ -163,14 +162,15 @@ class WideSearch {
   SE2 predicted_;
   int turns_;
   int steps_;
+  double price_;
   std::vector<Cell> cells_;  // of the points, turned
 };
 
 }  // namespace
 
 std::vector<SE2> widelySearched(const PreparedScan& reference, const PreparedScan& current, const SE2& predicted,
-                                const WideSearchOptions& options) {
-  return WideSearch(reference, current, predicted, options).bestPlaces();
+                                const WideSearchOptions& options, double price) {
+  return WideSearch(reference, current, predicted, options, price).bestPlaces();
 }
 
 }  // namespace sckf

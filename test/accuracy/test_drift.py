@@ -59,11 +59,11 @@ class DriftTest(unittest.TestCase):
     @classmethod
     def tearDownClass(cls) -> None:
         cls.folder.cleanup()
-        print(f"\n{'log':24}{'wheels alone':>24}{'measured':>24}{'at most':>24}")
+        print(f"\n{'log':40}{'wheels alone':>24}{'measured':>24}{'at most':>24}")
         for row in cls.table:
             cells = [f"{each.translation:.2f} {row.unit.replace(',', f', {each.rotation:.3f}')}"
                      for each in (row.wheels, row.measured, row.bound)]
-            print(f"{row.log:24}" + "".join(f"{cell:>24}" for cell in cells))
+            print(f"{row.log:40}" + "".join(f"{cell:>24}" for cell in cells))
 
     def path(self, name: str) -> Path:
         return Path(self.folder.name) / name
@@ -138,16 +138,25 @@ class DriftTest(unittest.TestCase):
         self.check_backwards("aces", 1.65, 0.085)
         self.check_backwards("freiburg-079", 1.3, 0.12)
 
-    def check_thinned(self, log: str, every: int, percent: float, deg_per_m: float) -> None:
+    def check_thinned(self, log: str, every: int, percent: float, deg_per_m: float, told: Optional[Told] = None) -> None:
         bag, tum = self.path("thinned.bag"), self.path("thinned.tum")
         thin_reference(recorded(log).with_suffix(".tum"), tum, thin(recorded(log), bag, every))
-        self.check_drift(f"{log}, 1 of {every} scans", bag, tum, percent, deg_per_m)
+        name = f"{log}, 1 of {every} scans"
+        if told:
+            worse = self.path("worse.bag")
+            worsen(str(bag), str(worse), told)
+            bag, name = worse, f"{name}, {told.__name__}"
+        self.check_drift(name, bag, tum, percent, deg_per_m)
 
     def test_scans_that_are_far_apart(self) -> None:
         """1.1 m and 36 degrees, 1.5 m and 30 degrees; and 0.7 m where the wheels are wrong by twice that when reversing."""
         self.check_thinned("intel", 2, 0.95, 0.085)
         self.check_thinned("aces", 2, 1.3, 0.08)
         self.check_thinned("freiburg-079", 8, 1.1, 0.1)
+
+    def test_scans_that_are_far_apart_and_wheels_that_slip(self) -> None:
+        self.check_thinned("aces", 2, 1.6, 0.09, slipping)
+        self.check_thinned("freiburg-079", 8, 1.3, 0.12, slipping)
 
     def test_on_freiburg_the_reference_errs_by_more_than_the_estimate(self) -> None:
         """Even where the estimate has half of the scans."""

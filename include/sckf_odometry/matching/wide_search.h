@@ -16,9 +16,10 @@ struct WideSearchOptions {
 
 /// Of all displacements in steps of 10 cm and 2.3° about the predicted one, those at which most points of the current
 /// scan lie near points of the reference: up to three that are turned against each other, as a room with square corners
-/// looks alike, the best first. Where the scans hardly tell, they are near the prediction. Good to about such a step,
-/// as the start of an alignment.
+/// looks alike, the best first. Good to about such a step, as the start of an alignment. price: of all points, so many
+/// must tell against the prediction for a place that is 1 m, or 1 rad, from it, so that where the scans hardly tell
+/// places are near the prediction; 0: all places are alike.
 std::vector<SE2> widelySearched(const PreparedScan& reference, const PreparedScan& current, const SE2& predicted,
-                                const WideSearchOptions& options);
+                                const WideSearchOptions& options, double price);
 
 }  // namespace sckf
