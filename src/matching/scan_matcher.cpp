@@ -46,7 +46,7 @@ class Search {
     if (options_.search_yaw_steps > 0) keepBetter(best, align(icp(bestOtherYaw()), options_.icp_pair_distance));
     if (options_.wide_search.yaw <= 0.0 || fits(best)) return best;
     takeIfBetter(best, backwards());
-    if (!fits(best)) takeIfBetter(best, farAway(kPrice));
+    if (!fits(best)) takeIfBetter(best, farAway(kPriceOfDistance));
     if (!best || agreesTooLittle(*best)) takeIfBetter(best, anywhere());
     return best;
   }
@@ -72,7 +72,6 @@ class Search {
   static constexpr double kRough = 2.0;          // residuals of twice what noise explains
   static constexpr double kSurprise = 16.0;      // four sigma from the prior
   static constexpr double kGain = 0.3;           // misfit: for less the prior is not given up
-  static constexpr double kPrice = 0.14;         // of a place far from the prediction
   static constexpr double kAgreesBetter = 0.05;  // for less one place far from the prior is not left for another
 
   static Eigen::Matrix3d priorFloor(const MatcherOptions& options) {

@@ -41,6 +41,12 @@ class Share:
     reference: Rms  # … and which are the reference's own; 0 where that comes out negative
 
 
+def rms(mean_squares: np.ndarray) -> Rms:
+    """Of translation and yaw, per metre."""
+    percent, deg_per_m = np.sqrt(np.maximum(mean_squares, 0.0)) * (100.0, np.degrees(1.0))
+    return Rms(percent, deg_per_m)
+
+
 def shares(reference: Trajectory, estimates: Sequence[Trajectory]) -> List[Share]:
     """Of two estimates. A segment counts if both cover its ends."""
     sampled = [sample(estimate, reference.stamps, DEFAULT_MAX_GAP) for estimate in estimates]
@@ -57,10 +63,6 @@ def shares(reference: Trajectory, estimates: Sequence[Trajectory]) -> List[Share
         def mean_squares(a: int, b: int, moved=moved, length=length) -> np.ndarray:
             apart = between(moved[a], moved[b]) / length
             return np.array([(apart[:, :2]**2).sum(axis=1).mean(), (apart[:, 2]**2).mean()])
-
-        def rms(squares: np.ndarray) -> Rms:
-            percent, deg_per_m = np.sqrt(np.maximum(squares, 0.0)) * (100.0, np.degrees(1.0))
-            return Rms(percent, deg_per_m)
 
         first, second, apart = mean_squares(0, 1), mean_squares(0, 2), mean_squares(1, 2)
         result.append(Share(length, rms(first), rms(apart), rms(0.5 * (first + second - apart))))

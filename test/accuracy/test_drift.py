@@ -24,8 +24,8 @@ from logs import MALAGA, installed, recorded, run, simulated  # noqa: E402
 from recording import halved, read_recording  # noqa: E402
 from reference_noise import by_halves, shares  # noqa: E402
 from revisit import closure, find_revisits  # noqa: E402
-from trajectory import Trajectory, between, drift, read_tum, sample  # noqa: E402
 from thinned import thin, thin_reference  # noqa: E402
+from trajectory import Trajectory, between, drift, read_tum, sample  # noqa: E402
 from turned_laser import turn_laser  # noqa: E402
 from worse_wheels import Told, freezing, slipping, worsen  # noqa: E402
 

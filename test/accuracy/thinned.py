@@ -10,7 +10,7 @@ import numpy as np
 import rosbag
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
-from trajectory import STAMP_TOLERANCE, Trajectory, read_tum, write_tum  # noqa: E402
+from trajectory import Trajectory, read_tum, sample, write_tum  # noqa: E402
 
 
 def thin(bag: Path, output: Path, every: int, first: int = 0, topic: str = "/scan") -> np.ndarray:
@@ -31,9 +31,7 @@ def thin(bag: Path, output: Path, every: int, first: int = 0, topic: str = "/sca
 def thin_reference(tum: Path, output: Path, stamps: np.ndarray) -> None:
     """stamps: of the scans that are left, in the order of time [s]."""
     reference = read_tum(tum)
-    after = np.searchsorted(stamps, reference.stamps).clip(1, len(stamps) - 1)
-    away = np.minimum(abs(stamps[after] - reference.stamps), abs(stamps[after - 1] - reference.stamps))
-    left = away <= STAMP_TOLERANCE
+    _, left = sample(Trajectory(stamps, np.zeros((len(stamps), 3))), reference.stamps, max_gap=0.0)
     write_tum(output, Trajectory(reference.stamps[left], reference.poses[left]))
 
 

@@ -12,8 +12,6 @@
 namespace sckf::test {
 namespace {
 
-constexpr double kPrice = 0.14;
-
 std::shared_ptr<const PreparedScan> scanFrom(const World& world, const SE2& pose, double noise = 0.01) {
   std::mt19937_64 random(static_cast<std::uint64_t>(1e3 * (10.0 + pose.x + pose.yaw)));
   SimulatedLaser laser = frontLaser();
@@ -24,7 +22,8 @@ std::shared_ptr<const PreparedScan> scanFrom(const World& world, const SE2& pose
 TEST(WideSearch, FindsThePlaceToAStep) {
   const auto reference = scanFrom(room(), SE2());
   for (const SE2& truth : {SE2(0.0, 0.0, 1.1), SE2(0.8, 0.1, -0.9), SE2(-0.7, -0.6, 0.5), SE2(0.9, 0.9, 0.0)}) {
-    const SE2 found = widelySearched(*reference, *scanFrom(room(), truth), SE2(), WideSearchOptions(), kPrice).front();
+    const SE2 found =
+        widelySearched(*reference, *scanFrom(room(), truth), SE2(), WideSearchOptions(), kPriceOfDistance).front();
     const Eigen::Vector3d e = error(found, truth);
     EXPECT_LT(e.head<2>().norm(), 0.16) << truth.vector().transpose() << ": " << e.transpose();
     EXPECT_LT(std::abs(e.z()), 0.05) << truth.vector().transpose() << ": " << e.transpose();
@@ -34,7 +33,8 @@ TEST(WideSearch, FindsThePlaceToAStep) {
 TEST(WideSearch, WhereTheScansDoNotTellItStaysNearThePrediction) {
   const auto reference = scanFrom(corridor(), SE2());
   const SE2 truth(0.5, 0.2, 0.6);
-  const SE2 found = widelySearched(*reference, *scanFrom(corridor(), truth), SE2(0.3, 0.0, 0.0), {}, kPrice).front();
+  const SE2 found =
+      widelySearched(*reference, *scanFrom(corridor(), truth), SE2(0.3, 0.0, 0.0), {}, kPriceOfDistance).front();
   EXPECT_NEAR(found.x, 0.3, 0.25) << "along the corridor";
   EXPECT_NEAR(found.y, 0.2, 0.1);
   EXPECT_NEAR(found.yaw, 0.6, 0.05);
@@ -46,13 +46,13 @@ TEST(WideSearch, LooksNoFartherThanItsBounds) {
   WideSearchOptions options;
   options.translation = 0.4;
   options.yaw = 0.3;
-  for (const SE2& found : widelySearched(*reference, *current, SE2(0.1, 0.0, 0.1), options, kPrice)) {
+  for (const SE2& found : widelySearched(*reference, *current, SE2(0.1, 0.0, 0.1), options, kPriceOfDistance)) {
     EXPECT_LE(std::abs(found.x - 0.1), 0.4 + 1e-9);
     EXPECT_LE(std::abs(found.y), 0.4 + 1e-9);
     EXPECT_LE(std::abs(found.yaw - 0.1), 0.3 + 1e-9);
   }
   options.translation = 0.0;
-  EXPECT_EQ(widelySearched(*reference, *current, SE2(0.1, 0.0, 0.1), options, kPrice).front().x, 0.1);
+  EXPECT_EQ(widelySearched(*reference, *current, SE2(0.1, 0.0, 0.1), options, kPriceOfDistance).front().x, 0.1);
 }
 
 /// What the wheels say that stood still while the robot turned.
@@ -91,7 +91,7 @@ World crossing() {
   return world;
 }
 
-/// Such places are so far away that no prediction may speak for another one. Not all are found: the crossing looks
+/// So far from the prediction that places near it may not be preferred. Not all are found: the crossing looks
 /// alike when turned by a quarter.
 TEST(WideSearch, FindsTurnsThatTakeHalfOfTheViewAway) {
   int tried = 0;
@@ -122,7 +122,7 @@ TEST(WideSearch, TellsASquareRoomFromItselfTurned) {
   const auto reference = scanFrom(world, SE2());
   for (const SE2& truth : {SE2(0.3, 0.1, 0.95), SE2(0.1, -0.3, -0.95)}) {
     const auto current = scanFrom(world, truth);
-    const std::vector<SE2> places = widelySearched(*reference, *current, SE2(), WideSearchOptions(), kPrice);
+    const std::vector<SE2> places = widelySearched(*reference, *current, SE2(), WideSearchOptions(), kPriceOfDistance);
     ASSERT_GE(places.size(), 2U);
     EXPECT_LE(places.size(), 3U);
     const Match match = ScanMatcher(MatcherOptions()).match(*reference, *current, frozen());
@@ -159,7 +159,7 @@ TEST(WideSearch, ReachesItsBounds) {
     const double reached = 0.1 * std::floor(bound / 0.1 + 1e-9);
     for (const double sign : {-1.0, 1.0}) {
       const SE2 truth(sign * reached, -sign * reached, 0.3);
-      const SE2 found = widelySearched(*reference, *scanFrom(room(), truth), SE2(), options, kPrice).front();
+      const SE2 found = widelySearched(*reference, *scanFrom(room(), truth), SE2(), options, kPriceOfDistance).front();
       EXPECT_NEAR(found.x, truth.x, 0.11) << bound;
       EXPECT_NEAR(found.y, truth.y, 0.11) << bound;
       EXPECT_NEAR(found.yaw, truth.yaw, 0.07) << bound;

@@ -14,6 +14,9 @@ struct WideSearchOptions {
   double translation = 1.5;  ///< [m] ahead, behind and to either side of it
 };
 
+/// The price of widelySearched() at which, where scans hardly tell, the wheels do.
+constexpr double kPriceOfDistance = 0.14;
+
 /// Of all displacements in steps of 10 cm and 2.3° about the predicted one, those at which most points of the current
 /// scan lie near points of the reference: up to three that are turned against each other, as a room with square corners
 /// looks alike, the best first. Good to about such a step, as the start of an alignment. price: of all points, so many
