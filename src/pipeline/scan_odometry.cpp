@@ -19,10 +19,6 @@ void checkPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance) {
   if (!problem.empty()) throw std::invalid_argument(problem);
 }
 
-DisplacementOptions displacementOptions(const PipelineOptions& options) {
-  return {options.matcher, options.reference, options.gate};
-}
-
 LaserConstants constantsOf(const PipelineOptions& options) {
   return {LaserConstant(options.range_offset_std), LaserConstant(options.sweep_duration_std)};
 }
@@ -38,7 +34,7 @@ ScanOdometry::ScanOdometry(const PipelineOptions& options, const SE2& odom_from_
       start_(odom_from_base),
       start_covariance_(covariance),
       filter_twist_(options.twist_window),
-      displacements_(displacementOptions(options), options.lasers),
+      displacements_(options, options.lasers),
       landmarks_(options.landmarks) {
   check(options);
   checkPose(odom_from_base, covariance);
@@ -213,7 +209,7 @@ void ScanOdometry::setPose(const SE2& odom_from_base, const Eigen::Matrix3d& cov
 void ScanOdometry::setOptions(const PipelineOptions& options) {
   checkChange(options_, options);
   options_ = options;
-  displacements_.setOptions(displacementOptions(options));
+  displacements_.setOptions(options);
   for (Laser& laser : lasers_) {
     laser.constants.range_offset.setStd(options.range_offset_std);
     laser.constants.sweep_duration.setStd(options.sweep_duration_std);
@@ -242,7 +238,7 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
   wheels_known_ = true;
   standstill_.interrupt();
   imu_.forgetTaken();
-  displacements_ = DisplacementUpdates(displacementOptions(options_), options_.lasers);
+  displacements_ = DisplacementUpdates(options_, options_.lasers);
   for (Laser& laser : lasers_) {
     laser.constants = constantsOf(options_);
     laser.taken.reset();

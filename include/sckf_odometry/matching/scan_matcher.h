@@ -6,32 +6,20 @@
 #include <string>
 
 #include "sckf_odometry/core/fusion_method.h"
-#include "sckf_odometry/matching/alignment_problem.h"
 #include "sckf_odometry/matching/displacement_estimation.h"
+#include "sckf_odometry/matching/displacement_search.h"
 #include "sckf_odometry/matching/prepared_scan.h"
-#include "sckf_odometry/matching/wide_search.h"
 
 namespace sckf {
 
-/// How the displacement is searched for.
-struct MatcherOptions {
-  double icp_pair_distance = 0.5;       ///< [m] CICP, if needed, pairs points up to this distance at its start
-  int max_iterations = 15;              ///< of an alignment
-  bool both_ways = true;                ///< match the reference with the current scan, too, and take the mean
-  double prior_std_translation = 0.05;  ///< [m] added to the prediction's std of x and y, for the pairing of points
-  double prior_std_yaw = 0.05;          ///< [rad] … and to its std of yaw
-  double search_below_agreement = 0.8;  ///< more starts are tried if the scans contradict each other by more
-  double search_yaw_step = 0.12;        ///< [rad] between the start yaws
-  int search_yaw_steps = 4;             ///< start yaws to either side of the prediction
-  double wide_search_below_agreement = 0.7;  ///< if they still do, wherever the scans may fall together
-  WideSearchOptions wide_search;
-  int min_pairs = 10;                  ///< fewer points with a partner are "too few pairs"
+/// How the displacement is searched for, and what is made of it.
+struct MatcherOptions : SearchOptions {
+  bool both_ways = true;               ///< match the reference with the current scan, too, and take the mean
   double min_overlap = 0.1;            ///< a smaller share of the points with a partner is "no overlap"
   double min_agreement = 0.6;          ///< less agreement of the scans is a contradiction, and no match
   double moved_place_min_share = 0.5;  ///< DecisivePlace::share() from which on a place that contradicts the prediction
                                        ///< is left out if what is left does not; 0: never
   double max_refinement = 0.5;  ///< [m, rad] a larger correction of the aligned pose by the estimate is "diverged"
-  PairOptions pairs;
   EstimationOptions estimation;
 };
 

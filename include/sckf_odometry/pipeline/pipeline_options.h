@@ -12,7 +12,7 @@
 
 namespace sckf {
 
-struct PipelineOptions {
+struct PipelineOptions : DisplacementOptions {
   std::string method = "sckf_multi";  ///< one of fusionMethodNames()
   OdometryNoise odometry_noise;
   CalibrationOptions calibration;
@@ -24,9 +24,6 @@ struct PipelineOptions {
   double range_offset_std = 0.015;   ///< [m] how wrong all ranges of a laser may be together: estimated; 0: not at all
   double sweep_duration_std = 0.01;  ///< [s] how long a laser may take for a scan: estimated; 0: motion meanwhile stays
   bool deskew = false;  ///< undo the motion while a scan is taken; it waits for odometry at its last beam then
-  MatcherOptions matcher;
-  ReferenceOptions reference;
-  GateOptions gate;
   LandmarkOptions landmarks;
   MotionLimits motion;
   double twist_window = 0.2;      ///< [s] the twist is the mean over this time: stamps of odometry come in bursts
