@@ -18,8 +18,8 @@ namespace sckf {
 /// Beyond the paper, its error state ξ = (ρ, θ) is a displacement of the world: X = exp(ξ) ⊕ X̂, so that
 ///   X̃ = T(X̂) ξ,  T = [I 𝒥p̂; 0 1].
 /// The motion of the robot leaves ξ as it is, and a displacement between two poses sees nothing but the difference of
-/// their ξ, wherever they are estimated to be: nothing that is common to all poses is ever taken for known. The residual
-/// of a displacement is the ξ that leads from its prediction to it, so that corrections may be large.
+/// their ξ, wherever they are estimated to be: nothing that is common to all poses is ever taken for known. The
+/// residual of a displacement is the ξ that leads from its prediction to it, so that corrections may be large.
 class MultiCloneFilter : public LandmarkStates {
  public:
   MultiCloneFilter(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, const StateOptions& states = {});
@@ -78,11 +78,15 @@ class MultiCloneFilter : public LandmarkStates {
 
   SE2 inWorld(const SE2& pose) const;
   double varianceOf(const std::optional<Part>& part) const;
-  OdometryIncrement calibrated(const OdometryIncrement& increment) const;
+
+  // The motion (multi_clone_filter_motion.cpp).
   Eigen::MatrixXd calibrationCovarianceAtFirst() const;
+  OdometryIncrement calibrated(const OdometryIncrement& increment) const;
   Eigen::Matrix3Xd byCalibration(const SE2& motion) const;
-  void forgetCalibration();
   void measureMotion(const OdometryIncrement& motion, const Eigen::Matrix3d& W);
+  void forgetCalibration();
+
+  // What corrects it (multi_clone_filter.cpp).
   Measurement measurement(const Displacement& displacement, const Innovation& innovation) const;
   Measurement measurement(std::size_t landmark, const Sighting& sighting) const;
   double update(const Measurement& measurement, double nis_bound);
