@@ -29,7 +29,7 @@ def _problem(wheels: np.ndarray) -> np.ndarray:
     x, y, yaw = wheels.T
     rows = np.zeros((len(wheels), 3, 4))
     rows[:, 0, 0], rows[:, 1, 0] = x, y
-    rows[:, 2, 1], rows[:, 2, 2] = yaw, np.hypot(x, y)
+    rows[:, 2, 1], rows[:, 2, 2] = yaw, x
     rows[:, 0, 3], rows[:, 1, 3] = np.cos(yaw) - 1.0, np.sin(yaw)
     return rows
 

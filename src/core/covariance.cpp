@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <cmath>
 #include <sstream>
 
 namespace sckf {
@@ -19,6 +20,13 @@ bool isPositiveDefinite(const Eigen::Matrix3d& P) {
   if (!isCovariance(P)) return false;
   const Eigen::LLT<Eigen::Matrix3d> factor(P);
   return factor.info() == Eigen::Success && factor.rcond() > 1e-12;
+}
+
+Eigen::Matrix3d withYawUpToATurn(const Eigen::Matrix3d& covariance) {
+  constexpr double kTurn = 6.28;  // [rad]
+  Eigen::Vector3d scale = Eigen::Vector3d::Ones();
+  if (covariance(2, 2) > kTurn * kTurn) scale(2) = kTurn / std::sqrt(covariance(2, 2));
+  return scale.asDiagonal() * covariance * scale.asDiagonal();
 }
 
 std::string problemOf(const SE2& pose, const Eigen::Matrix3d& covariance) {

@@ -59,8 +59,9 @@ void ErrorState::move(Part part, const MatrixXd& B, Part by) {
   P_.middleRows(part.row, part.size) += B * P_.middleRows(by.row, by.size);
   P_.middleCols(part.row, part.size) += P_.middleCols(by.row, by.size) * B.transpose();
   for (auto& [scan, noise] : ranges_) {
+    // eval: a part may be moved by itself.
     noise.coordinates.middleCols(part.row, part.size) +=
-        noise.coordinates.middleCols(by.row, by.size).lazyProduct(B.transpose());
+        noise.coordinates.middleCols(by.row, by.size).lazyProduct(B.transpose()).eval();
   }
 }
 

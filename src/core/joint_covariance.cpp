@@ -1,6 +1,7 @@
 #include "sckf_odometry/core/joint_covariance.h"
 
 #include <Eigen/Cholesky>
+#include <limits>
 
 #include "sckf_odometry/core/covariance.h"
 
@@ -26,7 +27,11 @@ Eigen::Matrix3d leverCorrection(const Innovation& innovation) {
 
 }  // namespace
 
-double Innovation::nis() const { return residual.dot(covariance.llt().solve(residual)); }
+double Innovation::nis() const {
+  const Eigen::LLT<MatrixDD> factor(covariance);
+  if (factor.info() != Eigen::Success) return std::numeric_limits<double>::quiet_NaN();
+  return residual.dot(factor.solve(residual));
+}
 
 JointCovariance::JointCovariance(const Eigen::Matrix3d& pose_covariance)
     : P_kk_(pose_covariance),

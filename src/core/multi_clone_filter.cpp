@@ -171,7 +171,9 @@ double MultiCloneFilter::updateHeading(double yaw, double variance, double nis_b
 
 double MultiCloneFilter::update(const Measurement& m, double nis_bound) {
   const ErrorState::Correlation with_r = errors_.correlate(m);
-  const double nis = m.residual.dot(with_r.innovation.llt().solve(m.residual));
+  const Eigen::LLT<MatrixXd> factor(with_r.innovation);
+  if (factor.info() != Eigen::Success) return kNoBound;
+  const double nis = m.residual.dot(factor.solve(m.residual));
   if (nis <= nis_bound) correct(m, with_r, allStates(), std::nullopt);
   return nis;
 }

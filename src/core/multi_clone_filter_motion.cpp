@@ -27,7 +27,7 @@ void allowForSlip(const MotionMeasurement& z, const Innovation::Vector& r, const
 WheelCalibration::Jacobian byWheelCalibration(const SE2& u) {
   WheelCalibration::Jacobian B = WheelCalibration::Jacobian::Zero();
   B.topLeftCorner<2, 1>() = u.translation();
-  B.block<1, 2>(2, 1) << u.yaw, u.translation().norm();
+  B.block<1, 2>(2, 1) << u.yaw, u.x;
   B.topRightCorner<2, 1>() << std::cos(u.yaw) - 1.0, std::sin(u.yaw);
   return B;
 }

@@ -121,8 +121,9 @@ OdometryIncrement modelledIncrement(const SE2& before_from_after, const Odometry
   throw std::invalid_argument("odometry model is \"" + noise.model + "\": expected one of " + known);
 }
 
-OdometryIncrement statedIncrement(const SE2& before_from_after, const Eigen::Matrix3d& twist_covariance, double dt) {
-  return {before_from_after, twist_covariance * dt * dt};
+OdometryIncrement statedIncrement(const SE2& before_from_after, const Eigen::Matrix3d& twist_covariance, double dt,
+                                  double interval) {
+  return {before_from_after, twist_covariance * dt * interval};
 }
 
 bool sensibleTwistCovariance(const Eigen::Matrix3d& twist_covariance) {

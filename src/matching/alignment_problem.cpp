@@ -15,6 +15,7 @@ double turnBetween(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return 
 
 /// From point i to the nearer of its neighbours in the order of the beams.
 Eigen::Vector2d toNextPoint(const ScannedPoints& points, std::size_t i) {
+  if (points.size() == 1) return Eigen::Vector2d::Zero();
   if (i == 0) return points.point[1] - points.point[0];
   const Eigen::Vector2d before = points.point[i - 1] - points.point[i];
   if (i + 1 == points.size()) return before;

@@ -106,13 +106,12 @@ std::vector<OdometryBuffer::Step> OdometryBuffer::steps(Stamp from, Stamp to) co
   std::vector<Step> steps;
   if (from >= to) return steps;
   OdometrySample last = at(from);
-  const auto append = [&steps, &last](const Entry& next) {
-    steps.push_back({last, next, next.guess});
+  auto after = firstAfter(samples_, from);
+  const auto append = [&](const Entry& next) {
+    steps.push_back({last, next, next.guess, seconds(after->stamp - std::prev(after)->stamp)});
     last = next;
   };
-  for (auto it = firstAfter(samples_, from); it != samples_.end() && it->stamp < to; ++it) {
-    append(*it);
-  }
+  for (; after->stamp < to; ++after) append(*after);
   append(at(to));
   return steps;
 }

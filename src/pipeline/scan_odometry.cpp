@@ -222,14 +222,15 @@ void ScanOdometry::setOptions(const PipelineOptions& options) {
 
 void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp) {
   const StateOptions states = statesFor(options_.calibration, options_.imu);
+  const Eigen::Matrix3d P = withYawUpToATurn(symmetric(covariance));
   map_ = nullptr;
   if (options_.pose_updates.on) {
-    auto odom = std::make_unique<MultiCloneFilter>(odom_from_base, symmetric(covariance), states);
+    auto odom = std::make_unique<MultiCloneFilter>(odom_from_base, P, states);
     auto map = std::make_unique<MapFilter>(std::move(odom));
     map_ = map.get();
     filter_ = std::move(map);
   } else {
-    filter_ = makeFusionMethod(options_.method, odom_from_base, symmetric(covariance), states);  // (6)(7)
+    filter_ = makeFusionMethod(options_.method, odom_from_base, P, states);  // (6)(7)
   }
   trail_.clear();
   filter_stamp_ = stamp;

@@ -174,7 +174,7 @@ OdometryIncrement ScanOdometry::byWheels(const OdometryBuffer::Step& step) const
   const SE2 motion = between(step.from.odom_from_base, step.to.odom_from_base);
   const auto& stated = step.to.twist_covariance;
   if (options_.prefer_twist_covariance && stated && sensibleTwistCovariance(*stated)) {
-    return statedIncrement(motion, *stated, seconds(step.to.stamp - step.from.stamp));
+    return statedIncrement(motion, *stated, seconds(step.to.stamp - step.from.stamp), step.interval);
   }
   return modelledIncrement(motion, options_.odometry_noise);
 }

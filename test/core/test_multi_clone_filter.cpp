@@ -257,6 +257,39 @@ TEST(MultiCloneFilter, TurnsAPoseFarFromTheOriginAboutItself) {
   EXPECT_LT((filter.pose().translation() - far.translation()).norm(), 1e-3);
 }
 
+/// The error of the yaw displaces what is far from where the estimate began by as much: numbers that large must not
+/// hide those of a displacement.
+TEST(MultiCloneFilter, TellsMillimetresHundredsOfMetresAwayWhereNothingIsKnownOfPlaceAndYaw) {
+  RandomInputs random(97);
+  MultiCloneFilter filter(SE2(), Eigen::Vector3d(1e6, 1e6, 39.0).asDiagonal(), {});
+  const Eigen::VectorXd R = Eigen::VectorXd::Constant(4, 1e-4);
+  SE2 truth;
+  SE2 reference;
+  double nis = 0.0;
+  constexpr int kScans = 2000;
+  for (int i = 0; i < kScans; ++i) {
+    filter.clone(R);
+    if (filter.clones() > 8) filter.forget(8);
+    reference = truth;
+    const SE2 step(0.9, 0.0, 0.9 / 300.0);
+    const Eigen::Matrix3d Q = Eigen::Vector3d(2e-3, 2e-3, 1e-2).asDiagonal();
+    truth = compose(truth, step);
+    filter.propagate({corrected(step, random.drawnFrom(Q)), Q});
+    filter.beginScan();
+    Displacement z;
+    z.matching_noise = Eigen::Vector3d(1e-5, 1e-5, 1e-6).asDiagonal();
+    z.reference_from_current = corrected(between(reference, truth), random.drawnFrom(z.matching_noise));
+    z.J_reference = z.J_current = Eigen::MatrixXd::Zero(3, 4);
+    z.variance_reference = z.variance_current = R;
+    const Innovation innovation = filter.innovation(z);
+    nis += innovation.nis() / kScans;
+    filter.update(z, innovation);
+    ASSERT_LT(error(filter.predictedDisplacement().reference_from_current, between(reference, truth)).norm(), 0.03)
+        << "scan " << i;
+  }
+  EXPECT_NEAR(nis, 3.0, 0.3);
+}
+
 TEST(MultiCloneFilter, NeverLearnsWhereTheWholeIs) {
   // Pose and yaw at the start are known to 1 m and 0.3 rad, and nothing that is measured between poses can tell more.
   RandomInputs random(83);

@@ -255,9 +255,16 @@ TEST(OdometryModel, QIsACovarianceWhateverTheMotion) {
 TEST(StatedIncrement, HoldsTheTwistOverTheTime) {
   Eigen::Matrix3d twist_covariance;
   twist_covariance << 0.04, 0.01, 0.0, 0.01, 0.09, -0.02, 0.0, -0.02, 0.16;
-  const OdometryIncrement increment = statedIncrement(SE2(0.1, 0.2, 0.3), twist_covariance, 0.5);
+  const OdometryIncrement increment = statedIncrement(SE2(0.1, 0.2, 0.3), twist_covariance, 0.5, 0.5);
   EXPECT_TRUE(matricesNear(increment.covariance, 0.25 * twist_covariance, 1e-15)) << "std [m] = std [m/s] · 0.5 s";
   EXPECT_TRUE(matricesNear(increment.before_from_after.vector(), Eigen::Vector3d(0.1, 0.2, 0.3), 0.0));
+}
+
+TEST(StatedIncrement, OfTheWholeIntervalIsThatOfItsParts) {
+  const Eigen::Matrix3d twist_covariance = diagonal(0.04, 0.09, 0.16);
+  Eigen::Matrix3d parts = Eigen::Matrix3d::Zero();
+  for (const double dt : {0.1, 0.25, 0.15}) parts += statedIncrement(SE2(), twist_covariance, dt, 0.5).covariance;
+  EXPECT_TRUE(matricesNear(parts, statedIncrement(SE2(), twist_covariance, 0.5, 0.5).covariance, 1e-15));
 }
 
 TEST(SensibleTwistCovariance, TakesWhatADriverMayMean) {

@@ -179,6 +179,32 @@ TEST(OtherMeasurements, OneErrorOfTheWheelsAloneIsEstimatedWhereTheOthersHaveNoS
   }
 }
 
+/// One wheel is larger than the other: what that turns the robot by on its way ahead it turns it back by when it reverses,
+/// where there is nothing to see.
+TEST(OtherMeasurements, WhatWheelsTurnTheRobotByAheadTheyTurnItBackInReverse) {
+  constexpr double kTurn = 0.05;  // [rad/m]
+  StateOptions states;
+  states.calibration_std << 0.02, 0.05, 0.05, 0.1;
+  states.calibration_way = 1000.0;
+  MultiCloneFilter filter(SE2(), Eigen::Matrix3d::Zero(), states);
+  SE2 truth;
+  const auto drive = [&](double way) {
+    truth = compose(truth, SE2(way, 0.0, kTurn * way));
+    filter.propagate(modelledIncrement(SE2(way, 0.0, 0.0), {}));
+  };
+  for (int i = 0; i < 100; ++i) {
+    filter.clone(Eigen::VectorXd(0));
+    if (filter.clones() > 1) filter.forget(1);
+    const SE2 reference = truth;
+    drive(0.2);
+    const Displacement z = seenToACentimetre(between(reference, truth));
+    filter.update(z, filter.innovation(z));
+  }
+  for (int i = 0; i < 50; ++i) drive(-0.2);
+  EXPECT_LT(std::abs(error(filter.pose(), truth).z()), 0.25 * kTurn * 10.0)
+      << "the wheels alone would be off by all of it";
+}
+
 /// A robot that comes by wheels to where it sees first, 30 m on, and then slips by half a radian: what it did is seen
 /// to a centimetre. That tells of the wheels, too, which led the robot all the way.
 TEST(OtherMeasurements, WhatIsLearnedOfTheWheelsDoesNotTurnTheWayBehind) {

@@ -48,6 +48,16 @@ TEST(AlignmentProblem, SurfacesThatAreTurnedAgainstEachOtherByMoreThanMostWeighL
   }
 }
 
+TEST(AlignmentProblem, AScanOfOnePointIsComparedWithAsAny) {
+  const auto room = scanOf(roomWithWallTurned(0.0));
+  std::vector<bool> all_but_one(room->size(), true);
+  all_but_one.front() = false;
+  const auto one = setAside(*room, all_but_one, {});
+  const AlignmentProblem problem(*one, *room, SE2(), 0.3, {});
+  ASSERT_GT(problem.pairs().size(), 0U);
+  EXPECT_TRUE(problem.normalEquations(SE2()).information.allFinite());
+}
+
 // ---- what contradicts
 
 /// A square room, with a board of 1 m across the way ahead if asked for.

@@ -130,10 +130,9 @@ TEST(OdometryBuffer, FollowsACurve) {
     for (int to = from + 7; to <= 2000; to += 310) {
       const auto steps = buffer.steps(ms(from), ms(to));
       expectChained(steps);
-      // The chord of 0.2 m and 0.1 rad lies 0.2 · 0.1 / 8 = 2.5 mm beside the arc.
       const SE2 truth = between(onCircle(1e-3 * from), onCircle(1e-3 * to));
       const Eigen::Vector3d off = error(motion(steps), truth);
-      EXPECT_LT(off.head<2>().norm(), 6e-3) << from << " to " << to << " ms: off by " << off.transpose();
+      EXPECT_LT(off.head<2>().norm(), 1e-9) << from << " to " << to << " ms: off by " << off.transpose();
       EXPECT_NEAR(off.z(), 0.0, 1e-12) << from << " to " << to << " ms";
     }
   }
@@ -150,6 +149,19 @@ TEST(OdometryBuffer, AnInterpolatedSampleHasTheTwistCovarianceOfItsInterval) {
   ASSERT_EQ(steps.size(), 2U);
   EXPECT_DOUBLE_EQ((*steps[0].to.twist_covariance)(0, 0), 2.0);
   EXPECT_DOUBLE_EQ((*steps[1].to.twist_covariance)(0, 0), 3.0);
+}
+
+TEST(OdometryBuffer, AStepKnowsTheIntervalThatItIsAPartOf) {
+  OdometryBuffer buffer = straight({0, 100, 300, 340});
+  for (const Stamp from : {ms(0), ms(10), ms(50)}) {
+    SCOPED_TRACE(testing::Message() << from.count() << " ns");
+    const auto steps = buffer.steps(from, ms(150));
+    ASSERT_EQ(steps.size(), 2U);
+    EXPECT_DOUBLE_EQ(steps[0].interval, 0.1);
+    EXPECT_DOUBLE_EQ(steps[1].interval, 0.2);
+  }
+  buffer.discardBefore(ms(310));
+  EXPECT_DOUBLE_EQ(buffer.steps(ms(310), ms(330)).front().interval, 0.04);
 }
 
 TEST(OdometryBuffer, ForgettingKeepsTheSampleBefore) {

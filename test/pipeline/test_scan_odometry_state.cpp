@@ -48,6 +48,19 @@ TEST(ScanOdometryState, APoseThatIsNoneIsRefusedByNameAndValue) {
   EXPECT_THAT(refusalOf(kElsewhere, bad), testing::HasSubstr("nan"));
 }
 
+TEST(ScanOdometryState, AYawThatIsNotKnownErrsByATurnAtMost) {
+  const SimulatedDrive drive;
+  Driven driven(drive);
+  driven.odometry(0);
+  Eigen::Matrix3d unknown = 1e6 * Eigen::Matrix3d::Identity();  // as people send it
+  unknown(0, 2) = unknown(2, 0) = 5e5;
+  driven.pipeline.setPose(kElsewhere, unknown, at(0));
+  const Eigen::Matrix3d P = driven.pipeline.latest()->covariance;
+  EXPECT_NEAR(std::sqrt(P(2, 2)), 6.28, 1e-9);
+  EXPECT_NEAR(P(0, 2) / std::sqrt(P(0, 0) * P(2, 2)), 0.5, 1e-9) << "the correlation stays";
+  EXPECT_NEAR(P(0, 0), 1e6, 1e-3);
+}
+
 // ---- start ----------------------------------------------------------------------------------------------------------
 
 TEST(ScanOdometryState, StartsWhereItIsTold) {

@@ -35,8 +35,9 @@ struct PoseMeasurement {
 };
 
 /// Systematic errors of the wheels, and of the laser's place: where the wheels tell (x, y, yaw), the true motion is
-/// (x (1 + s) − l (1 − cos yaw), y (1 + s) + l sin yaw, yaw (1 + r) + k √(x² + y²)): the laser is farther ahead, by l, of
-/// the point about which they turn than its mount says.
+/// (x (1 + s) − l (1 − cos yaw), y (1 + s) + l sin yaw, yaw (1 + r) + k x): one wheel is larger than the other, which turns
+/// the robot to the other side when it reverses; the laser is farther ahead, by l, of the point about which they turn
+/// than its mount says.
 struct WheelCalibration {
   using Jacobian = Eigen::Matrix<double, 3, 4>;          ///< of a motion x, y, yaw by s, r, k, l
   Eigen::Vector4d error = Eigen::Vector4d::Zero();       ///< s, r, k, l [1, 1, rad/m, m]

@@ -39,9 +39,12 @@ const std::vector<std::string>& odometryModelNames();
 /// std::invalid_argument with the names that there are if there is no model of that name.
 OdometryIncrement modelledIncrement(const SE2& before_from_after, const OdometryNoise& noise);
 
-/// The increment with the covariance that the robot's driver states for its twist (3 × 3: vx, vy, yaw rate), held over
-/// dt [s]: Q = Σ dt². Σ must be symmetric, positive definite on the diagonal and finite; see sensibleTwistCovariance().
-OdometryIncrement statedIncrement(const SE2& before_from_after, const Eigen::Matrix3d& twist_covariance, double dt);
+/// The increment with the covariance that the robot's driver states for its twist (3 × 3: vx, vy, yaw rate). It is made
+/// in dt [s], a part of the interval [s] in which the twist errs alike: Q = Σ dt interval, so that the parts of an
+/// interval add up to Σ interval², however it is cut. Σ must be symmetric, positive definite on the diagonal and finite;
+/// see sensibleTwistCovariance().
+OdometryIncrement statedIncrement(const SE2& before_from_after, const Eigen::Matrix3d& twist_covariance, double dt,
+                                  double interval);
 
 /// Whether a stated twist covariance can be used: finite, symmetric, positive semi-definite, not zero, and smaller than
 /// the "unknown" values (≥ 1e3) that drivers put there.

@@ -66,6 +66,7 @@ class OdometryBuffer {
     OdometrySample from;
     OdometrySample to;
     std::optional<MotionGuess> guess;  ///< where the samples do not tell the motion
+    double interval = 0.0;             ///< [s] between the two samples that it lies between
   };
 
   /// The motion between two instants that the buffer covers, in steps from sample to sample; the ends interpolated.

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "sckf_odometry/core/se2.h"
+#include "sckf_odometry/core/world_error.h"
 #include "sckf_odometry/matching/laser_scan.h"
 
 namespace sckf {
@@ -31,8 +32,8 @@ double share(const Sample& before, const Sample& after, Stamp stamp) {
 /// The pose at an instant between two samples with a pose odom_from_base: along a circular arc.
 template <typename Sample>
 SE2 poseBetween(const Sample& before, const Sample& after, Stamp stamp) {
-  const Eigen::Vector3d motion = between(before.odom_from_base, after.odom_from_base).vector();
-  return compose(before.odom_from_base, SE2(share(before, after, stamp) * motion));
+  const Eigen::Vector3d motion = world_error::logarithm(between(before.odom_from_base, after.odom_from_base));
+  return compose(before.odom_from_base, world_error::exponential(share(before, after, stamp) * motion));
 }
 
 }  // namespace sckf
