@@ -8,6 +8,8 @@ namespace sckf {
 
 namespace {
 
+constexpr double kContradiction = 3.0;  // loss of a point that the other scan has looked through
+
 double square(double v) { return v * v; }
 
 /// From a to b, both of length 1: the sine, which is the angle for turns that matter, and a little less for others.
@@ -171,20 +173,23 @@ NormalEquations AlignmentProblem::normalEquations(const SE2& reference_from_curr
           std::sqrt(lever_square_sum / static_cast<double>(residuals_.size()))};
 }
 
-double AlignmentProblem::misfit(const SE2& reference_from_current) const {
-  constexpr double kContradiction = 3.0;
-  constexpr double kFewest = 0.3;  // of the points: so many are compared in any case, as contradictions
+double AlignmentProblem::loss(const SE2& reference_from_current) const {
   const RigidMotion motion(reference_from_current);
   const RobustKernel kernel{2.0};  // one for all alignments, whatever their own scale
-  double sum = 0.0;
+  double sum = kContradiction * contradictions();
   for (const Residual& residual : residuals_) {
     const double share = residual.surface != nullptr ? 1.0 : 0.5;
     sum += share * std::min(kContradiction, kernel.loss(terms(residual, motion).e));
   }
-  const auto points = static_cast<double>(current_.size());
-  const auto paired = static_cast<double>(pairs_.size());
-  const double contradicting = contradictions() + std::max(0.0, kFewest * points - paired);
-  return (sum + kContradiction * contradicting) / (paired + contradicting);
+  return sum;
+}
+
+double AlignmentProblem::misfit(const SE2& reference_from_current) const {
+  constexpr double kFewest = 0.3;  // of the points: so many are compared in any case, as contradictions
+  const double missing =
+      std::max(0.0, kFewest * static_cast<double>(current_.size()) - static_cast<double>(pairs_.size()));
+  const double compared = static_cast<double>(pairs_.size()) + contradictions() + missing;
+  return (loss(reference_from_current) + kContradiction * missing) / compared;
 }
 
 }  // namespace sckf

@@ -15,21 +15,30 @@ FreeSpace::FreeSpace(const LaserScan& scan, const Eigen::Isometry3d& base_from_l
   first_bearing_ = wrapAngle(std::atan2(C(1, 0), C(0, 0)) + sense * scan.angle_min);
   increment_ = sense * scan.angle_increment;
   beams_in_a_turn_ = 2.0 * M_PI / std::abs(increment_);
+  const auto distance = [&](std::size_t i) { return (points.point[i] - origin_).norm(); };
   for (std::size_t i = 1; i + 1 < points.size(); ++i) {
     if (points.beam[i + 1] - points.beam[i - 1] != 2) continue;
-    const double reach = std::min({points.range[i - 1], points.range[i], points.range[i + 1]}) - margin;
-    if (reach > 0.0) square_reach_[static_cast<std::size_t>(points.beam[i])] = reach * reach;
+    const double reach = std::min({distance(i - 1), distance(i), distance(i + 1)}) - margin;
+    const std::optional<std::size_t> beam = beamTowards(points.point[i] - origin_);
+    if (!beam || reach <= 0.0) continue;
+    double& square = square_reach_[*beam];
+    square = square > 0.0 ? std::min(square, reach * reach) : reach * reach;
   }
 }
 
-bool FreeSpace::contains(const Eigen::Vector2d& point) const {
-  const Eigen::Vector2d d = point - origin_;
+std::optional<std::size_t> FreeSpace::beamTowards(const Eigen::Vector2d& d) const {
   double beam = (std::atan2(d.y(), d.x()) - first_bearing_) / increment_ + 0.5;  // rounded when it is cut off below
   if (beam < 0.0) beam += beams_in_a_turn_;
   if (beam >= beams_in_a_turn_) beam -= beams_in_a_turn_;
   // Before it is made an integer: beams may be so near each other that it is one of more than there are integers.
-  if (!(beam < static_cast<double>(square_reach_.size()))) return false;
-  return d.squaredNorm() < square_reach_[static_cast<std::size_t>(beam)];
+  if (!(beam < static_cast<double>(square_reach_.size()))) return std::nullopt;
+  return static_cast<std::size_t>(beam);
+}
+
+bool FreeSpace::contains(const Eigen::Vector2d& point) const {
+  const Eigen::Vector2d d = point - origin_;
+  const std::optional<std::size_t> beam = beamTowards(d);
+  return beam && d.squaredNorm() < square_reach_[*beam];
 }
 
 }  // namespace sckf

@@ -124,6 +124,13 @@ Match ScanMatcher::matchNear(const PreparedScan& reference, const PreparedScan& 
   return refinedByReturn(concluded(aligned, options_), reference, current, options_);
 }
 
+double ScanMatcher::loss(const PreparedScan& reference, const PreparedScan& current,
+                         const SE2& reference_from_current) const {
+  const double max_distance = options_.pairs.max_distance;
+  return AlignmentProblem(reference, current, reference_from_current, max_distance, options_.pairs)
+      .loss(reference_from_current);
+}
+
 bool ScanMatcher::refutes(const PreparedScan& reference, const PreparedScan& current,
                           const SE2& reference_from_current) const {
   constexpr double kHardlyAny = 0.1;  // agreement

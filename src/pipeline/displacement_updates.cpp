@@ -27,6 +27,14 @@ std::string describeDoubt(double agreement, double expected) {
   return text.str();
 }
 
+/// So far from where it is predicted that points are paired with others than they would be there.
+bool isFar(const Match& match, const DisplacementPrediction& prediction) {
+  constexpr double kFar = 0.3;     // [m]
+  constexpr double kTurned = 0.1;  // [rad]
+  const Eigen::Vector3d e = error(match.displacement->reference_from_current, prediction.reference_from_current);
+  return e.head<2>().norm() > kFar || std::abs(e.z()) > kTurned;
+}
+
 /// What matches err by beyond range noise is partly the same from reference to reference, as the same surfaces are
 /// taken wrong in each: it adds up faster than errors that have nothing in common. Only so much of it is in the pose as
 /// the update has taken over from the displacement: nothing where the wheels know better. matching_common:
@@ -55,8 +63,15 @@ void DisplacementUpdates::setOptions(const DisplacementOptions& options) {
 void DisplacementUpdates::update(ScanReport& report, FusionMethod& filter) {
   const std::size_t clone = *references_.newestOf(report.laser);
   const PreparedScan& reference = references_[clone];
+  Laser& laser = lasers_[report.laser];
   report.reference_stamp = reference.stamp;
   report.prediction = filter.predictedDisplacementFrom(clone);  // (16)
+  if (isOutOfReach(report.prediction, options_.reference)) {
+    report.outcome = ScanOutcome::kReference;
+    report.reason = "the last reference is too far away";
+    report.new_reference = laser.policy.replaces(report.prediction.reference_from_current, 0.0, false);
+    return;
+  }
   const Stopwatch stopwatch;
   report.match = matcher_.match(reference, *report.scan, report.prediction);  // (1)
   report.match_time = stopwatch.seconds();
@@ -68,7 +83,6 @@ void DisplacementUpdates::update(ScanReport& report, FusionMethod& filter) {
     report.outcome = ScanOutcome::kNoMatch;
     report.reason = toString(report.match.failure);
   }
-  Laser& laser = lasers_[report.laser];
   if (used) {
     laser.place(report.stamp);
   } else {
@@ -82,7 +96,7 @@ bool DisplacementUpdates::fuse(ScanReport& report, FusionMethod& filter) {
   const Displacement& displacement = *report.match.displacement;
   report.innovation = filter.innovation(displacement);
   report.nis_bound = bound(displacement);
-  if (lasers_[report.laser].failures > 0 && report.match.agreement < options_.gate.doubtful_min_agreement) {
+  if (isDoubtful(report)) {
     report.outcome = ScanOutcome::kGated;
     report.reason = describeDoubt(report.match.agreement, options_.gate.doubtful_min_agreement);
     return false;
@@ -102,6 +116,17 @@ bool DisplacementUpdates::fuse(ScanReport& report, FusionMethod& filter) {
   }
   filter.update(displacement, *report.innovation);
   return true;
+}
+
+/// A reference that could not be placed itself may be a crowd, of which the next scan sees half elsewhere: scans have
+/// to agree better than others. But where they never do, as in falling snow, that is what the place looks like, and
+/// after some time they count as they are.
+bool DisplacementUpdates::isDoubtful(const ScanReport& report) const {
+  constexpr int kMany = 20;                  // scans in a row that were placed by no reference …
+  constexpr std::chrono::seconds kLong(20);  // … for so long
+  const Laser& laser = lasers_[report.laser];
+  if (laser.failures == 0 || report.match.agreement >= options_.gate.doubtful_min_agreement) return false;
+  return laser.failures < kMany || (laser.placed && report.stamp < *laser.placed + Stamp(kLong));
 }
 
 void DisplacementUpdates::becomeReference(ScanReport& report, FusionMethod& filter) {
@@ -129,11 +154,13 @@ void DisplacementUpdates::compareWithOlder(ScanReport& report, FusionMethod& fil
 std::optional<Displacement> DisplacementUpdates::displacementFrom(std::size_t clone, const ScanReport& report,
                                                                   const FusionMethod& filter) const {
   const bool placed = lasers_[report.laser].failures == 0;
-  Match match = matchWithOlder(references_[clone], *report.scan, filter.predictedDisplacementFrom(clone), placed);
+  const DisplacementPrediction prediction = filter.predictedDisplacementFrom(clone);
+  Match match = matchWithOlder(references_[clone], *report.scan, prediction, placed);
   if (!match.displacement || match.overlap < options_.reference.older_min_overlap) return std::nullopt;
+  match.displacement->clone = clone;
   if (!placed && !outweighsWheels(match)) return std::nullopt;
+  if (isFar(match, prediction) && !tellsAgainst(prediction, match, *report.scan)) return std::nullopt;
   Displacement& displacement = *match.displacement;
-  displacement.clone = clone;
   displacement.matching_noise += (options_.reference.older_inflation - 1.0) * displacement.covariance();
   return std::move(match.displacement);
 }
@@ -183,10 +210,25 @@ double DisplacementUpdates::bound(const Displacement& displacement) const {
 /// Where the scans refute what the wheels tell these are wrong, and any match will do that has its place.
 bool DisplacementUpdates::looksLikeSlip(const ScanReport& report) const {
   const Match& match = report.match;
+  if (!tellsAgainst(report.prediction, match, *report.scan)) return false;
   if (outweighsWheels(match)) return true;
   return options_.gate.trust_scans_on_slip && isPlaced(match) &&
          matcher_.refutes(references_[match.displacement->clone], *report.scan,
                           report.prediction.reference_from_current);
+}
+
+/// Whether both scans see enough that speaks for the match and against the prediction. Where a laser sees little, a
+/// short wall falls on another one somewhere, perfectly, and nothing speaks against either place.
+bool DisplacementUpdates::tellsAgainst(const DisplacementPrediction& prediction, const Match& match,
+                                       const PreparedScan& scan) const {
+  // Loss, of which four neighbouring points tell as much as one: e^12 to 1 against the prediction, as a slip is one of
+  // hundreds of scans, and a search looks at thousands of places.
+  constexpr double kClearly = 50.0;
+  const Displacement& z = *match.displacement;
+  const PreparedScan& reference = references_[z.clone];
+  return matcher_.loss(reference, scan, prediction.reference_from_current) -
+             matcher_.loss(reference, scan, z.reference_from_current) >=
+         kClearly;
 }
 
 bool DisplacementUpdates::outweighsWheels(const Match& match) const {

@@ -1,9 +1,11 @@
 // What the beams of a scan went through.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "matching/simulated_world.h"
 #include "sckf_odometry/matching/prepared_scan.h"
 
 namespace sckf::test {
@@ -96,6 +98,30 @@ TEST(FreeSpace, ALaserAllRoundHasNoEdgeAtTheTurn) {
   const FreeSpace free = freeSpace(scan);
   for (double degrees = -170.0; degrees < 171.0; degrees += 10.0)
     EXPECT_TRUE(free.contains(at(3.0, degrees))) << degrees;
+}
+
+/// What a scan has seen is not where it has looked through, however its points have come to be where they are.
+int pointsInItsOwn(const PreparedScan& scan) {
+  return static_cast<int>(
+      std::count_if(scan.points.point.begin(), scan.points.point.end(),
+                    [&scan](const Eigen::Vector2d& point) { return scan.free_space.contains(point); }));
+}
+
+TEST(FreeSpace, ATiltedLaserLooksAsFarAsItsPointsAreInThePlane) {
+  const Eigen::Isometry3d tilted(Eigen::AngleAxisd(15.0 * M_PI / 180.0, Eigen::Vector3d::UnitY()));
+  const auto prepared = prepareScan(simulateScan(room(), SE2(0.3, 0.2, 0.4), SimulatedLaser()), tilted, {});
+  EXPECT_EQ(pointsInItsOwn(*prepared), 0);
+  EXPECT_TRUE(prepared->free_space.contains(0.5 * prepared->points.point[40]));
+}
+
+TEST(FreeSpace, OfARobotThatTurnsIsWhereItsPointsAre) {
+  LaserScan scan = simulateScan(room(), SE2(0.3, 0.2, 0.4), SimulatedLaser());
+  scan.time_increment = 0.09 / static_cast<double>(scan.ranges.size());
+  ScanMotion motion;
+  motion.add(SE2(0.04, 0.0, 0.3), 0.09);
+  const auto prepared = prepareScan(scan, Eigen::Isometry3d::Identity(), {}, nullptr, motion);
+  EXPECT_EQ(pointsInItsOwn(*prepared), 0);
+  EXPECT_TRUE(prepared->free_space.contains(0.5 * prepared->points.point[40]));
 }
 
 TEST(FreeSpace, BeamsMayBeSoNearEachOtherThatNoIntegerCountsThem) {

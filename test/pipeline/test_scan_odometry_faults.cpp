@@ -333,6 +333,83 @@ TEST(ScanOdometryFaults, FindsBackFromAReferenceInAnotherPlace) {
   expectRecovers(driven, 2200, 0.06);
 }
 
+/// Snow, seen by every fifth beam, is none of the room, nor where it was at the next scan.
+LaserScan inSnow(LaserScan scan, int ms) {
+  std::mt19937_64 random(static_cast<std::uint64_t>(ms));
+  std::uniform_real_distribution<double> share(0.0, 1.0);
+  for (float& range : scan.ranges) {
+    if (share(random) < 0.2) range = static_cast<float>(0.3 + (range - 0.3) * share(random));
+  }
+  return scan;
+}
+
+/// Where scans never agree as well as in a building, one that fits nowhere must not make all that follow doubtful.
+TEST(ScanOdometryFaults, WhereScansNeverAgreeWellOneThatFitsNowhereIsForgiven) {
+  const World other = closedPolygon({{-6, -4}, {2, -4}, {2, -3}, {4, -3}, {4, 4.5}, {0, 4.5}, {0, 6}, {-6, 6}});
+  const SimulatedDrive drive({}, 46000);
+  const SimulatedDrive elsewhere({}, 46000, other);
+  Driven driven(drive, wheelsAsTheyAre());
+  driven.odometry(0);
+  for (int ms = 20; ms <= 46000; ms += 20) {
+    if (ms % 100 == 20) driven.scan(inSnow((ms < 5000 ? drive : elsewhere).scan(ms - 13), ms));  // by a lift
+    driven.odometry(ms);
+  }
+  std::size_t before = 0;
+  std::size_t at_last = 0;
+  for (const ScanReport& report : driven.reports) {
+    if (!wasUsed(report.outcome)) continue;
+    if (report.stamp < at(5000)) ++before;
+    if (report.stamp > at(36000)) ++at_last;
+  }
+  EXPECT_GT(before, 40U) << "of 49: the snow alone is no obstacle";
+  EXPECT_GT(at_last, 80U) << "of 100";
+  EXPECT_LT(driven.count(ScanOutcome::kUpdated), driven.reports.size() - 100) << "for some time they were in doubt";
+}
+
+/// Of the first board nothing is in view after the turn, and the second one is as wide and as far: the one falls on the
+/// other as well as a wall on itself, and nothing that is seen tells against the wheels.
+TEST(ScanOdometryFaults, WhatFallsOnAnotherWallPerfectlyIsNoSlipIfNothingTellsAgainstTheWheels) {
+  const auto turned = [](double yaw, double y) {
+    return Eigen::Vector2d(SE2(0.0, 0.0, yaw).rotation() * Eigen::Vector2d(2.0, y));
+  };
+  World boards;
+  for (const double yaw : {0.0, 1.2}) boards.push_back({turned(yaw, -0.5), turned(yaw, 0.5)});
+  const auto turning = [](double t) { return SE2(0.0, 0.0, 1.2 * std::clamp((t - 1.0) / 0.08, 0.0, 1.0)); };
+  Wheels right;
+  right.scale = 1.0;
+  right.yaw_per_meter = 0.0;
+  SimulatedDrive drive(right, 3000, boards, turning);
+  drive.laser.beams = 121;
+  drive.laser.angle_min = -0.5;
+  drive.laser.angle_increment = 1.0 / 120.0;
+  PipelineOptions options = trustingTheWheels();
+  options.motion.max_yaw_rate = 20.0;
+  Driven driven(drive, options);
+  driven.odometry(0);
+  driven.run(0, 2980);
+  EXPECT_EQ(driven.count(ScanOutcome::kSlip), 0U);
+  EXPECT_LT(driven.latestError(2980).head<2>().norm(), 0.1) << driven.latestError(2980).transpose();
+  EXPECT_LT(std::abs(driven.latestError(2980).z()), 0.1) << driven.latestError(2980).transpose();
+}
+
+/// After a way on which the laser saw nothing its last reference is of no use: what a scan sees there may be anything.
+TEST(ScanOdometryFaults, AReferenceOutOfReachIsNotComparedWith) {
+  const auto ahead = [](double t) { return SE2(0.5 * t, 0.0, 0.0); };
+  World walls = closedPolygon({{-2, -2}, {2, -2}, {2, 2}, {-2, 2}});
+  for (const Wall& wall : closedPolygon({{8, -2}, {14, -2}, {14, 2}, {8, 2}})) walls.push_back(wall);
+  SimulatedDrive drive({}, 22000, walls, ahead);
+  Driven driven(drive, wheelsAsTheyAre());
+  driven.odometry(0);
+  for (int ms = 20; ms <= 22000; ms += 20) {
+    const bool blind = ms > 1500 && ms < 18500;
+    if (ms % 100 == 20) driven.scan(blind ? constantScan(drive, ms - 13, 100.0F) : drive.scan(ms - 13));
+    driven.odometry(ms);
+  }
+  EXPECT_EQ(driven.count(ScanOutcome::kReference), 2U);
+  EXPECT_EQ(driven.count(ScanOutcome::kNoMatch) + driven.count(ScanOutcome::kSlip), 0U);
+  EXPECT_GT(driven.count(ScanOutcome::kUpdated), 45U);
+}
+
 // ---- contradictions -------------------------------------------------------------------------------------------------
 
 /// The laser is 0.08 m to the left of where it is taken to be: a displacement that the wheels have not seen.

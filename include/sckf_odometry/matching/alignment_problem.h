@@ -120,6 +120,9 @@ class AlignmentProblem {
   /// it sees.
   double misfit(const SE2& reference_from_current) const;
 
+  /// The loss of all points that both scans see: no mean, and nothing is made of how few they are.
+  double loss(const SE2& reference_from_current) const;
+
  private:
   void addSurfacePair(const Pair& pair, const RigidMotion& reference_from_current, const PairOptions& options);
   void addPointPair(const Pair& pair, const PairOptions& options);

@@ -62,6 +62,9 @@ class ScanMatcher {
   Match matchNear(const PreparedScan& reference, const PreparedScan& current,
                   const DisplacementPrediction& prediction) const;
 
+  /// What both scans see that does not fit if they lie so: see AlignmentProblem::loss().
+  double loss(const PreparedScan& reference, const PreparedScan& current, const SE2& reference_from_current) const;
+
   /// Whether the scans cannot lie so: hardly a point has a partner, and many are where the other scan has seen that
   /// nothing is. Not if they just see nothing in common.
   bool refutes(const PreparedScan& reference, const PreparedScan& current, const SE2& reference_from_current) const;

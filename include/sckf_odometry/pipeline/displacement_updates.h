@@ -65,6 +65,7 @@ class DisplacementUpdates {
   };
 
   bool fuse(ScanReport& report, FusionMethod& filter);
+  bool isDoubtful(const ScanReport& report) const;
   void allowForSlip(FusionMethod& filter, double way) const;
   void admitFailure(const ScanReport& report, FusionMethod& filter);
   bool othersTell(Stamp stamp) const;
@@ -76,6 +77,7 @@ class DisplacementUpdates {
   double bound(const Displacement& displacement) const;  // a larger innovation, normalised and squared, contradicts
   bool looksLikeSlip(const ScanReport& report) const;
   bool outweighsWheels(const Match& match) const;
+  bool tellsAgainst(const DisplacementPrediction& prediction, const Match& match, const PreparedScan& scan) const;
   bool matchesWell(const Match& match) const;
   bool isPlaced(const Match& match) const;
 
