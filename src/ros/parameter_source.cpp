@@ -25,49 +25,58 @@ std::string shown(const ParameterValue::Texts& texts) {
   return "[" + all + "]";
 }
 
+/// A number that is not meant as a whole one keeps its point.
+std::string shown(double value) {
+  std::ostringstream text;
+  text << value;
+  return text.str().find_first_of(".en") == std::string::npos ? text.str() + ".0" : text.str();
+}
+
+std::string shown(XmlRpc::XmlRpcValue& node) {
+  if (node.getType() == XmlRpc::XmlRpcValue::TypeArray) {
+    ParameterValue::Texts entries;
+    for (int i = 0; i < node.size(); ++i) entries.push_back(shown(node[i]));
+    return shown(entries);
+  }
+  if (node.getType() == XmlRpc::XmlRpcValue::TypeString) return "\"" + static_cast<std::string&>(node) + "\"";
+  if (node.getType() == XmlRpc::XmlRpcValue::TypeDouble) return shown(static_cast<double&>(node));
+  if (node.getType() == XmlRpc::XmlRpcValue::TypeBoolean) return static_cast<bool&>(node) ? "true" : "false";
+  std::ostringstream text;
+  node.write(text);
+  return text.str();
+}
+
 ParameterValue list(XmlRpc::XmlRpcValue& node) {
   ParameterValue::Texts texts;
   for (int i = 0; i < node.size(); ++i) {
-    if (node[i].getType() != XmlRpc::XmlRpcValue::TypeString) {
-      std::ostringstream text;
-      node.write(text);
-      return {ParameterValue::Other(), text.str()};
-    }
+    if (node[i].getType() != XmlRpc::XmlRpcValue::TypeString) return {ParameterValue::Other(), shown(node)};
     texts.push_back(static_cast<std::string&>(node[i]));
   }
   return {texts, shown(texts)};
 }
 
 void collect(const std::string& name, XmlRpc::XmlRpcValue& node, Values& values) {
-  std::ostringstream text;
-  node.write(text);
   switch (node.getType()) {
     case XmlRpc::XmlRpcValue::TypeStruct:
       for (auto& [key, member] : node) collect(joined(name, key), member, values);
       break;
-    case XmlRpc::XmlRpcValue::TypeBoolean: {
-      const bool value = static_cast<bool&>(node);
-      values[name] = {value, value ? "true" : "false"};
+    case XmlRpc::XmlRpcValue::TypeBoolean:
+      values[name] = {static_cast<bool&>(node), shown(node)};
       break;
-    }
     case XmlRpc::XmlRpcValue::TypeInt:
-      values[name] = {static_cast<int&>(node), text.str()};
+      values[name] = {static_cast<int&>(node), shown(node)};
       break;
     case XmlRpc::XmlRpcValue::TypeDouble:
-      text.str("");
-      text << static_cast<double&>(node);
-      values[name] = {static_cast<double&>(node), text.str()};
+      values[name] = {static_cast<double&>(node), shown(node)};
       break;
-    case XmlRpc::XmlRpcValue::TypeString: {
-      const auto& value = static_cast<std::string&>(node);
-      values[name] = {value, "\"" + value + "\""};
+    case XmlRpc::XmlRpcValue::TypeString:
+      values[name] = {static_cast<std::string&>(node), shown(node)};
       break;
-    }
     case XmlRpc::XmlRpcValue::TypeArray:
       values[name] = list(node);
       break;
     default:
-      values[name] = {ParameterValue::Other(), text.str()};
+      values[name] = {ParameterValue::Other(), shown(node)};
   }
 }
 
@@ -124,7 +133,7 @@ ParameterFile::ParameterFile(const std::string& path) {
     const YAML::Node root = YAML::LoadFile(path);
     if (!root.IsMap() && !root.IsNull()) throw YAML::Exception(root.Mark(), "not a list of \"name: value\"");
     if (root.IsMap()) collect("", root, values_);
-  } catch (const YAML::Exception& exception) {
+  } catch (const std::exception& exception) {  // of yaml-cpp, or of the stream: the path is that of a folder
     throw std::invalid_argument("parameter file " + path + ": " + exception.what());
   }
 }

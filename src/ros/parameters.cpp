@@ -150,6 +150,9 @@ void checkTogether(const Options& options, std::vector<std::string>& problems) {
   if (node.map_frame == node.odom_frame || node.map_frame == node.base_frame) {
     problems.push_back("map_frame = \"" + node.map_frame + "\": another frame than odom_frame and base_frame expected");
   }
+  if (node.publish_map_tf && !options.pipeline.pose_updates.on) {
+    problems.push_back("publish_map_tf = true: only with use_pose_updates = true, which gives it something to publish");
+  }
   if (node.use_tf_odometry && node.tf_odometry_frame == node.base_frame) {
     problems.push_back("tf_odometry_frame = \"" + node.tf_odometry_frame +
                        "\": another frame than base_frame expected");
@@ -161,6 +164,16 @@ void checkTogether(const Options& options, std::vector<std::string>& problems) {
 std::vector<std::string> rangeTopics(const NodeOptions& options) {
   const bool is_default = options.scan_topics == NodeOptions().scan_topics;
   return options.use_cloud_input && is_default ? std::vector<std::string>{"cloud_in"} : options.scan_topics;
+}
+
+void checkTopics(const std::vector<std::string>& topics, const std::vector<std::string>& resolved) {
+  for (std::size_t i = 0; i < resolved.size(); ++i) {
+    const auto same = std::find(resolved.begin(), resolved.begin() + static_cast<std::ptrdiff_t>(i), resolved[i]);
+    const auto first = static_cast<std::size_t>(same - resolved.begin());
+    if (first == i) continue;
+    throw std::invalid_argument("scan_topics has \"" + topics[first] + "\" and \"" + topics[i] + "\": both are " +
+                                resolved[i] + ", topics of which none comes twice expected");
+  }
 }
 
 bool Range::contains(double value) const {

@@ -161,7 +161,19 @@ TEST(Parameters, ValuesThatContradictEachOtherAreRefused) {
   EXPECT_TRUE(contains(refusal("corner_min_length: 2.0\n"), "corner_min_length = 2: less than corner_max_length"));
   EXPECT_TRUE(
       contains(refusal("odom_frame: base_link\n"), "odom_frame = \"base_link\": another frame than base_frame"));
+  EXPECT_TRUE(contains(refusal("publish_map_tf: true\n"), "publish_map_tf = true: only with use_pose_updates = true"));
   EXPECT_TRUE(contains(refusal("map_frame: /odom\n"), "map_frame = \"odom\": another frame than odom_frame and base"));
+}
+
+TEST(Parameters, TopicsThatAreTheSameInTheEndAreRefusedByName) {
+  checkTopics({"scan", "rear/scan"}, {"/scan", "/rear/scan"});
+  try {
+    checkTopics({"scan", "rear/scan", "/scan"}, {"/scan", "/rear/scan", "/scan"});
+    ADD_FAILURE() << "accepted";
+  } catch (const std::invalid_argument& exception) {
+    EXPECT_STREQ(exception.what(),
+                 "scan_topics has \"scan\" and \"/scan\": both are /scan, topics of which none comes twice expected");
+  }
 }
 
 TEST(Parameters, UnknownNamesAreToldAndChangeNothing) {
@@ -230,6 +242,12 @@ TEST(Parameters, WhatIsNotGivenStaysAsItWas) {
 TEST(Parameters, AFileThatCannotBeReadIsNamed) {
   EXPECT_THROW(ParameterFile("/nowhere/parameters.yaml"), std::invalid_argument);
   EXPECT_TRUE(contains(refusal("- a\n- list\n"), "sckf_parameters.yaml"));
+  try {
+    ParameterFile(testing::TempDir());
+    ADD_FAILURE() << "a folder is no file";
+  } catch (const std::invalid_argument& exception) {
+    EXPECT_TRUE(contains(exception.what(), "parameter file " + testing::TempDir() + ": "));
+  }
   EXPECT_TRUE(contains(refusal("odom_frame: [unclosed\n"), "sckf_parameters.yaml"));
 }
 

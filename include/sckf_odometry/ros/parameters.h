@@ -41,6 +41,10 @@ struct NodeOptions {
 /// scan_topics; of clouds, where it is at its default, cloud_in.
 std::vector<std::string> rangeTopics(const NodeOptions& options);
 
+/// resolved: what each of `topics` is in the end. Throws std::invalid_argument, by name, if two are the same: each scan
+/// would be used twice.
+void checkTopics(const std::vector<std::string>& topics, const std::vector<std::string>& resolved);
+
 /// Everything that can be set from outside.
 struct Options {
   PipelineOptions pipeline;
