@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <deque>
 #include <iostream>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -20,6 +21,7 @@
 #include "sckf_odometry/ros/range_message.h"
 #include "sckf_odometry/ros/tf_input.h"
 #include "sckf_odometry/tools/progress_bar.h"
+#include "sckf_odometry/tools/refusals.h"
 #include "sckf_odometry/tools/replay_statistics.h"
 #include "sckf_odometry/tools/replay_tables.h"
 
@@ -42,6 +44,9 @@ struct Arguments {
   double duration = 0.0;  ///< [s], 0: to its end
 };
 
+/// As bags name it.
+std::string resolved(const std::string& topic) { return !topic.empty() && topic.front() == '/' ? topic : "/" + topic; }
+
 class Replay {
  public:
   Replay(const Arguments& arguments, const Options& options)
@@ -54,7 +59,9 @@ class Replay {
         map_trajectory_(arguments.map_trajectory),
         csv_(arguments.csv),
         scan_topics_(rangeTopics(options.node)) {
-    for (std::string& topic : scan_topics_) topic = topic.front() == '/' ? topic : "/" + topic;
+    for (std::string& topic : scan_topics_) topic = resolved(topic);
+    checkTopics(rangeTopics(options.node), scan_topics_);
+    scans_.resize(scan_topics_.size());
     if (csv_) writeCsvHeader(csv_);
   }
 
@@ -65,10 +72,10 @@ class Replay {
     } catch (const rosbag::BagException& exception) {
       throw std::runtime_error(arguments_.bag + ": " + exception.what());
     }
+    const ros::Time begin = beginOf(bag);
+    const ros::Time end = arguments_.duration > 0.0 ? begin + ros::Duration(arguments_.duration) : ros::TIME_MAX;
     std::vector<std::string> topics{"/tf", arguments_.odom_topic, arguments_.imu_topic, arguments_.pose_update_topic};
     topics.insert(topics.end(), scan_topics_.begin(), scan_topics_.end());
-    const ros::Time begin = rosbag::View(bag).getBeginTime() + ros::Duration(arguments_.start);
-    const ros::Time end = arguments_.duration > 0.0 ? begin + ros::Duration(arguments_.duration) : ros::TIME_MAX;
     rosbag::View view(bag, rosbag::TopicQuery("/tf_static"));  // holds ever after
     view.addQuery(bag, rosbag::TopicQuery(topics), begin, end);
     const Stopwatch stopwatch;
@@ -78,18 +85,17 @@ class Replay {
       progress.advance();
     }
     progress.finish();
-    if (scans_ == 0) {
-      throw std::runtime_error(arguments_.bag + ": no sensor_msgs/" + (takesClouds() ? "PointCloud2" : "LaserScan") +
-                               " on " + scan_topics_.front() + "; see --scan-topic");
-    }
+    refusals_.finish();
+    checkInput();
     if (!waiting_.empty()) {
       std::fprintf(stderr, "%zu scans not used: no transform %s -> %s: %s\n", waiting_.size(),
                    options_.node.base_frame.c_str(), frameName(waiting_.back().message.header.frame_id).c_str(),
                    mount_problem_.c_str());
     }
+    csv_.finish();
+    checkOutput();
     trajectory_.finish();
     map_trajectory_.finish();
-    csv_.finish();
     const double log_duration = view.size() > 0 ? (view.getEndTime() - begin).toSec() : 0.0;
     statistics_.print(log_duration, stopwatch.seconds());
   }
@@ -97,10 +103,56 @@ class Replay {
  private:
   bool takesClouds() const { return options_.node.use_cloud_input; }
 
+  ros::Time beginOf(const rosbag::Bag& bag) const {
+    rosbag::View all(bag);
+    if (all.size() == 0) throw std::runtime_error(arguments_.bag + ": no messages");
+    const double duration = (all.getEndTime() - all.getBeginTime()).toSec();
+    if (arguments_.start <= duration) return all.getBeginTime() + ros::Duration(arguments_.start);
+    std::ostringstream text;
+    text << arguments_.bag << ": --start " << arguments_.start << ": no more than the bag's " << duration
+         << " s expected";
+    throw std::runtime_error(text.str());
+  }
+
+  /// Throws where nothing, or too little, has come of what the estimate is made of.
+  void checkInput() const {
+    for (std::size_t laser = 0; laser < scan_topics_.size(); ++laser) {
+      if (scans_[laser] > 0) continue;
+      throw std::runtime_error(arguments_.bag + ": no sensor_msgs/" + (takesClouds() ? "PointCloud2" : "LaserScan") +
+                               " on " + scan_topics_[laser] + "; see --scan-topic");
+    }
+    if (odometry_used_ > 0) return;
+    const std::string problem = odometryProblem();
+    if (!options_.pipeline.scans_alone) throw std::runtime_error(arguments_.bag + ": " + problem);
+    std::fprintf(stderr, "%s: the scans carry on alone\n", problem.c_str());
+  }
+
+  std::string odometryProblem() const {
+    const NodeOptions& node = options_.node;
+    if (node.use_tf_odometry) {
+      return "no odometry on TF, " + node.tf_odometry_frame + " -> " + node.base_frame + " " + tf_.odometryProblem();
+    }
+    if (odometry_ == 0) return "no nav_msgs/Odometry on " + arguments_.odom_topic + "; see --odom-topic";
+    return "none of " + std::to_string(odometry_) + " messages of odometry on " + arguments_.odom_topic + " was used";
+  }
+
+  /// Throws where a trajectory would be empty.
+  void checkOutput() const {
+    if (trajectory_ && poses_ == 0) {
+      throw std::runtime_error(arguments_.bag + ": no pose at any scan" +
+                               (last_reason_.empty() ? "" : "; the last one: " + last_reason_));
+    }
+    if (map_trajectory_ && map_poses_ == 0) {
+      throw std::runtime_error(arguments_.bag + ": no pose in " + options_.node.map_frame +
+                               ": no geometry_msgs/PoseWithCovarianceStamped that could be used on " +
+                               arguments_.pose_update_topic + "; see --pose-update-topic");
+    }
+  }
+
   void take(const rosbag::MessageInstance& message) {
     if (const auto transforms = message.instantiate<tf2_msgs::TFMessage>()) {
       tf_.add(*transforms, message.getTopic() == "/tf_static");
-      for (const OdometrySample& sample : tf_.takeOdometry()) pipeline_.addOdometry(sample);
+      for (const OdometrySample& sample : tf_.takeOdometry()) addOdometry(sample);
     } else if (const auto odometry = message.instantiate<nav_msgs::Odometry>()) {
       addOdometry(*odometry);
     } else if (const auto imu = message.instantiate<sensor_msgs::Imu>()) {
@@ -110,8 +162,9 @@ class Replay {
     } else if (const auto cloud = message.instantiate<sensor_msgs::PointCloud2>(); cloud && takesClouds()) {
       addCloud(laserOf(message.getTopic()), cloud);
     } else if (const auto scan = message.instantiate<sensor_msgs::LaserScan>(); scan && !takesClouds()) {
-      ++scans_;
-      waiting_.push_back({laserOf(message.getTopic()), {scan->header, scan}});
+      const std::size_t laser = laserOf(message.getTopic());
+      ++scans_[laser];
+      waiting_.push_back({laser, {scan->header, scan}});
     }
     passScansWithMount();
     process();
@@ -122,25 +175,30 @@ class Replay {
   }
 
   void addCloud(std::size_t laser, const sensor_msgs::PointCloud2::ConstPtr& cloud) {
-    ++scans_;
+    ++scans_[laser];
     const std::string problem = cloudProblem(*cloud);
     if (problem.empty()) {
       waiting_.push_back({laser, {cloud->header, cloud}});
     } else {
-      std::fprintf(stderr, "cloud at %.9f not used: %s\n", cloud->header.stamp.toSec(), problem.c_str());
+      refusals_.add("cloud", toStamp(cloud->header.stamp), problem);
     }
   }
 
   void addOdometry(const nav_msgs::Odometry& message) {
     if (options_.node.use_tf_odometry) return;
+    ++odometry_;
     std::string problem;
     auto sample = toOdometrySample(message, &problem);
     if (sample) sample = tf_.inBaseFrame(*sample, frameName(message.child_frame_id), &problem);
     if (sample) {
-      pipeline_.addOdometry(*sample);
+      addOdometry(*sample);
     } else {
-      std::fprintf(stderr, "odometry at %.9f not used: %s\n", message.header.stamp.toSec(), problem.c_str());
+      refusals_.add("odometry", toStamp(message.header.stamp), problem);
     }
+  }
+
+  void addOdometry(const OdometrySample& sample) {
+    if (pipeline_.addOdometry(sample) == OdometryBuffer::Insertion::kInserted) ++odometry_used_;
   }
 
   void addImu(const sensor_msgs::Imu& message) {
@@ -151,7 +209,7 @@ class Replay {
     if (sample) {
       pipeline_.addImu(*sample);
     } else {
-      std::fprintf(stderr, "IMU at %.9f not used: %s\n", message.header.stamp.toSec(), problem.c_str());
+      refusals_.add("IMU", toStamp(message.header.stamp), problem);
     }
   }
 
@@ -161,7 +219,7 @@ class Replay {
     if (const auto pose = toGivenPose(message, options_.node.map_frame, &problem)) {
       pipeline_.addPose({pose->stamp, {pose->odom_from_base, pose->covariance}});
     } else {
-      std::fprintf(stderr, "pose at %.9f not used: %s\n", message.header.stamp.toSec(), problem.c_str());
+      refusals_.add("pose", toStamp(message.header.stamp), problem);
     }
   }
 
@@ -182,11 +240,13 @@ class Replay {
     const double time = stopwatch.seconds();
     for (const PoseReport& report : pipeline_.takePoseReports()) {
       if (report.reason.empty()) continue;
-      std::fprintf(stderr, "pose at %s not used: %s: %s\n", decimal(report.stamp).c_str(),
-                   toString(report.outcome).c_str(), report.reason.c_str());
+      refusals_.add("pose", report.stamp, toString(report.outcome) + ": " + report.reason);
     }
     for (const ScanReport& report : reports) {
       statistics_.add(report, time / static_cast<double>(reports.size()));
+      if (report.estimate) ++poses_;
+      if (report.in_map) ++map_poses_;
+      if (!report.reason.empty()) last_reason_ = toString(report.outcome) + ": " + report.reason;
       if (trajectory_ && report.estimate) writeTumLine(trajectory_, report.stamp, report.estimate->odom_from_base);
       if (map_trajectory_ && report.in_map) writeTumLine(map_trajectory_, report.stamp, report.in_map->map_from_base);
       if (csv_) writeCsvLine(csv_, report);
@@ -208,7 +268,13 @@ class Replay {
   std::vector<std::string> scan_topics_;  // of each laser
   std::deque<Waiting> waiting_;           // for their mount
   std::string mount_problem_;
-  std::size_t scans_ = 0;
+  std::vector<std::size_t> scans_;  // that came, of each laser
+  std::size_t odometry_ = 0;        // messages on the topic
+  std::size_t odometry_used_ = 0;
+  std::size_t poses_ = 0;  // at the scans
+  std::size_t map_poses_ = 0;
+  std::string last_reason_;  // of a scan that was not used
+  Refusals refusals_;
 };
 
 /// Nothing if the help was asked for, and shown.
@@ -251,6 +317,9 @@ std::optional<Arguments> parse(int argc, char** argv) {
   if (values.count("duration") != 0 && !(arguments.duration > 0.0))
     throw po::error("--duration: expected more than 0 s");
   if (arguments.trajectory.empty() && arguments.csv.empty()) throw po::error("--trajectory or --csv is needed");
+  for (std::string* topic : {&arguments.odom_topic, &arguments.imu_topic, &arguments.pose_update_topic}) {
+    *topic = resolved(*topic);
+  }
   return arguments;
 }
 
@@ -264,6 +333,9 @@ Options optionsFor(const Arguments& arguments) {
   if (!arguments.method.empty()) options.pipeline.method = arguments.method;
   if (!arguments.scan_topics.empty()) options.node.scan_topics = arguments.scan_topics;
   options.pipeline.lasers = options.node.scan_topics.size();
+  if (!arguments.map_trajectory.empty() && !options.pipeline.pose_updates.on) {
+    throw boost::program_options::error("--map-trajectory: use_pose_updates: true expected, in the file of --params");
+  }
   return options;
 }
 

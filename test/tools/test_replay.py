@@ -13,10 +13,11 @@ import sys
 import tempfile
 import unittest
 from pathlib import Path
-from typing import Dict, List
+from typing import Any, Callable, Dict, List
 
 import numpy as np
 import rosbag
+import rospy
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "test" / "ros"), str(ROOT / "scripts")]
@@ -65,8 +66,16 @@ class ReplayTest(unittest.TestCase):
         done = self.run_replay(*arguments, "--trajectory", output)
         self.assertGreater(done.returncode, 0, "negative: it crashed; zero: it was content\n" + done.stdout)
         self.assertRegex(done.stderr, r"(?m)^replay: ")
-        self.assertFalse(output.exists(), output)
+        self.assertEqual([path.name for path in output.parent.glob(output.name + "*")], [])
         return done.stderr
+
+    def changed_bag(self, name: str, change: Callable[[str, Any], str]) -> Path:
+        """The bag with messages that were changed, and under the topics that were returned."""
+        path = self.path(name)
+        with rosbag.Bag(str(self.bag)) as source, rosbag.Bag(str(path), "w") as target:
+            for topic, message, stamp in source.read_messages():
+                target.write(change(topic, message), message, stamp)
+        return path
 
     def trajectory(self, *arguments: str | Path) -> Trajectory:
         output = self.path("trajectory.tum")
@@ -104,7 +113,7 @@ class ReplayTest(unittest.TestCase):
         for option, value, expected in (("--start", "-1", "0 s or more"), ("--start", "nan", "0 s or more"),
                                         ("--duration", "0", "more than 0 s"), ("--duration", "-2", "more than 0 s")):
             self.assertIn(f"{option}: expected {expected}", self.refused(self.bag, f"{option}={value}"))
-        self.assertIn("no sensor_msgs/LaserScan", self.refused(self.bag, "--start", "1000"))
+        self.assertRegex(self.refused(self.bag, "--start", "1000"), r"--start 1000: no more than the bag's 1[0-9.]+ s expected")
 
     def test_absolute_poses_and_an_imu_of_the_bag_are_used_if_asked_for(self) -> None:
         bag, params, out = self.path("others.bag"), self.path("others.yaml"), self.path("others.tum")
@@ -199,13 +208,12 @@ class ReplayTest(unittest.TestCase):
         np.testing.assert_array_equal(by_file.poses, self.trajectory().poses)
 
     def test_other_topics(self) -> None:
-        renamed = self.path("renamed.bag")
-        with rosbag.Bag(str(self.bag)) as source, rosbag.Bag(str(renamed), "w") as target:
-            for topic, message, stamp in source.read_messages():
-                target.write({"/scan": "/front/scan", "/odom": "/wheels"}.get(topic, topic), message, stamp)
+        names = {"/scan": "/front/scan", "/odom": "/wheels"}
+        renamed = self.changed_bag("renamed.bag", lambda topic, message: names.get(topic, topic))
         output = self.path("renamed.tum")
-        self.replay(renamed, "--trajectory", output, "--scan-topic", "/front/scan", "--odom-topic", "/wheels")
-        np.testing.assert_array_equal(read_tum(output).poses, self.trajectory().poses)
+        for slash in ("/", ""):
+            self.replay(renamed, "--trajectory", output, "--scan-topic", slash + "front/scan", "--odom-topic", slash + "wheels")
+            np.testing.assert_array_equal(read_tum(output).poses, self.trajectory().poses)
 
     # ---- wrong input
 
@@ -225,6 +233,7 @@ class ReplayTest(unittest.TestCase):
 
     def test_a_parameter_file_that_is_missing_or_no_yaml_is_named(self) -> None:
         self.assertIn("nowhere.yaml", self.refused(self.bag, "--params", self.path("nowhere.yaml")))
+        self.assertIn(f"parameter file {self.folder.name}: ", self.refused(self.bag, "--params", self.folder.name))
         params = self.path("broken.yaml")
         params.write_text("method: [sckf\n", encoding="utf-8")
         self.assertIn("broken.yaml", self.refused(self.bag, "--params", params))
@@ -243,12 +252,66 @@ class ReplayTest(unittest.TestCase):
         self.refused(text)
 
     def test_a_topic_without_scans_is_named(self) -> None:
-        self.assertIn("/front/scan", self.refused(self.bag, "--scan-topic", "/front/scan"))
+        expected = "no sensor_msgs/LaserScan on /front/scan; see --scan-topic"
+        self.assertIn(expected, self.refused(self.bag, "--scan-topic", "/front/scan"))
+        self.assertIn(expected, self.refused(self.bag, "--scan-topic", "scan", "--scan-topic", "front/scan"))
+        self.assertIn('"scan" and "/scan": both are /scan', self.refused(
+            self.bag, "--scan-topic", "scan", "--scan-topic", "/scan"))
 
-    def test_an_output_that_cannot_be_written_is_named(self) -> None:
-        done = self.run_replay(self.bag, "--trajectory", self.path("no_folder") / "out.tum")
-        self.assertGreater(done.returncode, 0)
-        self.assertIn("no_folder", done.stderr)
+    def test_a_topic_without_odometry_is_named(self) -> None:
+        self.assertIn("no nav_msgs/Odometry on /wheels; see --odom-topic",
+                      self.refused(self.bag, "--odom-topic", "wheels"))
+        params = self.path("tf_odometry.yaml")
+        params.write_text("use_tf_odometry: true\n", encoding="utf-8")
+        self.assertIn("no odometry on TF, odom -> base_link", self.refused(self.bag, "--params", params))
+
+    def test_scans_alone_need_no_odometry_but_it_is_said(self) -> None:
+        params, output = self.path("alone.yaml"), self.path("alone.tum")
+        params.write_text("scans_alone: true\n", encoding="utf-8")
+        done = self.run_replay(self.bag, "--trajectory", output, "--params", params, "--odom-topic", "/wheels")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("no nav_msgs/Odometry on /wheels; see --odom-topic: the scans carry on alone", done.stderr)
+        self.assertGreater(len(read_tum(output).stamps), 10)
+
+    def test_odometry_that_is_refused_throughout_is_said_once_with_a_count(self) -> None:
+        def unknown_frame(topic: str, message: Any) -> str:
+            if topic == "/odom":
+                message.child_frame_id = "axle"
+            return topic
+
+        said = self.refused(self.changed_bag("axle.bag", unknown_frame))
+        self.assertRegex(said, r"replay: .*: none of [0-9]{3} messages of odometry on /odom was used")
+        self.assertLess(said.count('child_frame_id is "axle"'), 5, said)
+        self.assertRegex(said, r"(?m)^[0-9]{3} of these, the last one: odometry at [0-9.]+ not used: child_frame_id is")
+
+    def test_scans_without_any_pose_are_an_error(self) -> None:
+        def far_away(topic: str, message: Any) -> str:
+            if topic == "/scan":
+                message.header.stamp -= rospy.Duration(1000)
+            return topic
+
+        said = self.refused(self.changed_bag("other_clock.bag", far_away))
+        self.assertIn("no pose at any scan; the last one: no odometry: older than the odometry at hand: its stamp is", said)
+        self.assertIn("are the clocks synchronised?", said)
+
+    def test_a_trajectory_in_map_needs_absolute_poses(self) -> None:
+        in_map = self.path("no_map.tum")
+        self.assertIn("--map-trajectory: use_pose_updates: true expected",
+                      self.refused(self.bag, "--map-trajectory", in_map))
+        params = self.path("poses.yaml")
+        params.write_text("use_pose_updates: true\n", encoding="utf-8")
+        said = self.refused(self.bag, "--map-trajectory", in_map, "--params", params, "--pose-update-topic", "amcl_pose")
+        self.assertIn("on /amcl_pose; see --pose-update-topic", said)
+        self.assertFalse(in_map.exists())
+
+    def test_an_output_that_cannot_be_written_is_named_with_the_reason(self) -> None:
+        folder = self.path("folder")
+        folder.mkdir()
+        for output, reason in ((self.path("no_folder") / "out.tum", "No such file or directory"), (folder, "Is a directory")):
+            done = self.run_replay(self.bag, "--trajectory", output)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn(f"{output}: cannot be written: {reason}", done.stderr)
+        self.assertEqual(list(self.path("").glob("*.part")), [])
 
     def test_a_wrong_call_is_refused(self) -> None:
         for arguments in ((), (self.bag,), (self.bag, "--nonsense")):
