@@ -17,12 +17,16 @@ TfInput::TfInput(const std::string& base_frame, const std::string& odometry_fram
     : base_frame_(base_frame), odometry_frame_(odometry_frame), time_jump_(time_jump) {}
 
 void TfInput::add(const tf2_msgs::TFMessage& message, bool is_static) {
-  for (const geometry_msgs::TransformStamped& transform : message.transforms) {
-    const bool is_odometry = !is_static && frameName(transform.header.frame_id) == odometry_frame_;
-    if (is_odometry) noteOdometryStamp(transform.header.stamp);
-    buffer_.setTransform(transform, "sckf_odometry", is_static);
-  }
+  for (const geometry_msgs::TransformStamped& transform : message.transforms) add(transform, is_static);
 }
+
+void TfInput::add(const geometry_msgs::TransformStamped& transform, bool is_static) {
+  const bool is_odometry = !is_static && frameName(transform.header.frame_id) == odometry_frame_;
+  if (is_odometry) noteOdometryStamp(transform.header.stamp);
+  buffer_.setTransform(transform, "sckf_odometry", is_static);
+}
+
+void TfInput::forgetMounts() { mounts_.clear(); }
 
 void TfInput::clear() {
   buffer_.clear();
@@ -71,7 +75,11 @@ std::vector<OdometrySample> TfInput::takeOdometry() {
   std::size_t taken = 0;  // with those before it: what was older than the rest of the chain never becomes known
   for (std::size_t i = 0; i < odometry_stamps_.size(); ++i) {
     const ros::Time& stamp = odometry_stamps_[i];
-    if (!buffer_.canTransform(odometry_frame_, base_frame_, stamp, &odometry_problem_)) continue;
+    std::string problem;  // each time a new one: tf2 appends to what it is given
+    if (!buffer_.canTransform(odometry_frame_, base_frame_, stamp, &problem)) {
+      odometry_problem_ = problem;
+      continue;
+    }
     const auto pose =
         toPlanar(buffer_.lookupTransform(odometry_frame_, base_frame_, stamp).transform, &odometry_problem_);
     taken = i + 1;

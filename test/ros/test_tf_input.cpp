@@ -30,6 +30,16 @@ TEST(TfInput, AMountIsKnownWhenTfHasToldIt) {
   EXPECT_NEAR(error(toPlanar(*mount), SE2(1.0, 2.0, 0.5)).norm(), 0.0, 1e-12);
 }
 
+TEST(TfInput, AMountIsLookedUpOnceAndAgainWhenItIsForgotten) {
+  TfInput tf("base_link", "", kJump);
+  tf.add(transform("base_link", "laser", 0.0, SE2(1.0, 0.0, 0.0)), true);
+  EXPECT_EQ(tf.baseFrom("laser", nullptr)->translation().x(), 1.0);
+  tf.add(transform("base_link", "laser", 0.0, SE2(2.0, 0.0, 0.0)), true);
+  EXPECT_EQ(tf.baseFrom("laser", nullptr)->translation().x(), 1.0);
+  tf.forgetMounts();
+  EXPECT_EQ(tf.baseFrom("laser", nullptr)->translation().x(), 2.0);
+}
+
 TEST(TfInput, AScanInTheFrameOfTheRobotNeedsNoTransform) {
   TfInput tf("base_link", "", kJump);
   EXPECT_TRUE(tf.baseFrom("base_link", nullptr)->isApprox(Eigen::Isometry3d::Identity()));
@@ -71,6 +81,16 @@ TEST(TfInput, OdometryWaitsForTheRestOfItsChain) {
   EXPECT_EQ(samples[0].stamp, at(1.1));
   EXPECT_NEAR(error(samples[0].odom_from_base, SE2(2.0, 0.5, 0.0)).norm(), 0.0, 1e-12);
   EXPECT_TRUE(tf.odometryProblem().empty());
+}
+
+TEST(TfInput, WhatKeepsOdometryFromBeingToldIsSaidOnceHoweverOftenItIsAskedFor) {
+  TfInput tf("base_footprint", "odom", kJump);
+  for (int i = 0; i < 100; ++i) {
+    tf.add(transform("odom", "base_link", 1.0 + 0.1 * i, SE2()), false);
+    EXPECT_TRUE(tf.takeOdometry().empty());
+  }
+  EXPECT_TRUE(contains(tf.odometryProblem(), "base_footprint"));
+  EXPECT_LT(tf.odometryProblem().size(), 300u) << tf.odometryProblem();
 }
 
 TEST(TfInput, TimeThatGoesBackForGoodIsFollowed) {

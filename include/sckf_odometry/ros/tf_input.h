@@ -1,6 +1,7 @@
 // What the robot says on TF: the mounts of its lasers and, if asked, its wheel odometry.
 #pragma once
 
+#include <geometry_msgs/TransformStamped.h>
 #include <tf2/buffer_core.h>
 #include <tf2_msgs/TFMessage.h>
 
@@ -23,9 +24,13 @@ class TfInput {
   TfInput(const std::string& base_frame, const std::string& odometry_frame, Stamp time_jump);
 
   void add(const tf2_msgs::TFMessage& message, bool is_static);
+  void add(const geometry_msgs::TransformStamped& transform, bool is_static);
 
   /// Forgets all but what is fixed: time begins again, and it would refuse what is older than what it has.
   void clear();
+
+  /// Mounts are looked up again: somebody has corrected them.
+  void forgetMounts();
 
   /// Pose of a frame that is fixed to the robot, in base_frame, looked up once. Empty while TF does not tell; then
   /// `problem` says what is missing.
