@@ -8,6 +8,7 @@
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "sckf_odometry");
+  const ros::NodeHandle keeps_the_log;  // with the last one roscpp's log ends, before it is said what was wrong
   try {
     const sckf::ScKfOdometryNode node(ros::NodeHandle(), ros::NodeHandle("~"));
     ros::spin();
