@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -17,6 +18,25 @@ namespace {
 void checkPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance) {
   const std::string problem = problemOf(odom_from_base, covariance);
   if (!problem.empty()) throw std::invalid_argument(problem);
+}
+
+/// The end of a reason: a stamp beside those of the odometry at hand.
+std::string besideOdometry(Stamp stamp, const OdometryBuffer& odometry) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(3) << ": its stamp is " << seconds(stamp) << " s, ";
+  if (odometry.empty()) return text.str() + "there is no odometry";
+  text << "those of the odometry are " << seconds(odometry.oldest()) << " to " << seconds(odometry.newest()) << " s";
+  if (odometry.covers(stamp)) return text.str();
+  const Stamp apart = std::max(odometry.oldest() - stamp, stamp - odometry.newest());
+  text << ", " << seconds(apart) << " s away: are the clocks synchronised?";
+  return text.str();
+}
+
+std::string besideEstimate(Stamp stamp, Stamp estimate) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(3) << ": its stamp is " << seconds(stamp) << " s, that of the estimate "
+       << seconds(estimate) << " s, " << seconds(estimate - stamp) << " s later";
+  return text.str();
 }
 
 LaserConstants constantsOf(const PipelineOptions& options) {
@@ -70,8 +90,9 @@ void ScanOdometry::addScan(LaserScan scan, const Eigen::Isometry3d& base_from_la
   waiting_.add(std::move(scan), base_from_laser, sweep, laser);
   while (waiting_.size() > static_cast<std::size_t>(options_.max_waiting_scans)) {
     const WaitingScans::Entry given_up = waiting_.giveUp();
-    given_up_.push_back(notUsed(given_up.scan.stamp, given_up.laser, ScanOutcome::kNoOdometry,
-                                "too many scans wait for odometry at their stamps"));
+    given_up_.push_back(
+        notUsed(given_up.scan.stamp, given_up.laser, ScanOutcome::kNoOdometry,
+                "too many scans wait for odometry at their stamps" + besideOdometry(given_up.scan.stamp, odometry_)));
   }
 }
 
@@ -102,11 +123,13 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   const Stopwatch stopwatch;
   const Stamp stamp = waiting.scan.stamp;
   if (!odometry_.covers(stamp)) {
-    return notUsed(stamp, waiting.laser, ScanOutcome::kNoOdometry, "older than the odometry at hand");
+    return notUsed(stamp, waiting.laser, ScanOutcome::kNoOdometry,
+                   "older than the odometry at hand" + besideOdometry(stamp, odometry_));
   }
   Laser& laser = lasers_[waiting.laser];
   if (stamp < filter_stamp_ || laser.taken == stamp) {
-    return notUsed(stamp, waiting.laser, ScanOutcome::kOutOfOrder, "not newer than the estimate");
+    return notUsed(stamp, waiting.laser, ScanOutcome::kOutOfOrder,
+                   "not newer than the estimate" + besideEstimate(stamp, filter_stamp_));
   }
   laser.taken = stamp;
   ScanReport report;

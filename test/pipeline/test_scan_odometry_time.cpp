@@ -167,7 +167,8 @@ TEST(ScanOdometryTime, AScanThatIsNotNewerIsOutOfOrder) {
   driven.run(0, 1000);
   ASSERT_EQ(driven.reports.back().stamp, at(907));
   expectIgnored(driven, drive.scan(907), ScanOutcome::kOutOfOrder, "not newer than the estimate");
-  expectIgnored(driven, drive.scan(906), ScanOutcome::kOutOfOrder, "not newer than the estimate");
+  expectIgnored(driven, drive.scan(906), ScanOutcome::kOutOfOrder, "0.906 s, that of the estimate ");
+  EXPECT_THAT(driven.reports.back().reason, testing::EndsWith("0.907 s, 0.001 s later"));
   driven.run(1000, 1100);
   EXPECT_EQ(driven.reports.back().outcome, ScanOutcome::kUpdated);
 }
@@ -186,6 +187,8 @@ TEST(ScanOdometryTime, AScanBeforeTheFirstOdometryHasNone) {
   driven.odometry(500);
   driven.odometry(520);
   expectIgnored(driven, drive.scan(499), ScanOutcome::kNoOdometry, "older than the odometry");
+  EXPECT_THAT(driven.reports.back().reason, testing::HasSubstr("0.499 s, those of the odometry are "));
+  EXPECT_THAT(driven.reports.back().reason, testing::EndsWith(", 0.001 s away: are the clocks synchronised?"));
   driven.scan(507);
   EXPECT_EQ(driven.reports.back().outcome, ScanOutcome::kReference);
 }
@@ -205,6 +208,7 @@ TEST(ScanOdometryTime, OfTooManyWaitingScansTheOldestAreGivenUp) {
     EXPECT_EQ(driven.reports[i].stamp, at(107 + 100 * static_cast<int>(i)));
     EXPECT_EQ(driven.reports[i].outcome, ScanOutcome::kNoOdometry);
     EXPECT_THAT(driven.reports[i].reason, testing::HasSubstr("too many scans wait"));
+    EXPECT_THAT(driven.reports[i].reason, testing::HasSubstr("s away: are the clocks synchronised?"));
     EXPECT_FALSE(driven.reports[i].estimate);
   }
   expectNear(before, *driven.pipeline.latest(), 0.0);
