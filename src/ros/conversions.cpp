@@ -84,6 +84,20 @@ Stamp now() { return toStamp(ros::Time::now()); }
 
 ros::Time toTime(Stamp stamp) { return ros::Time().fromNSec(static_cast<uint64_t>(stamp.count())); }
 
+std::string duplicateOf(Stamp stamp) {
+  std::ostringstream text;
+  text << "header.stamp is " << toTime(stamp) << ": there is one of that stamp already";
+  return text.str();
+}
+
+std::string afterAScan(Stamp stamp, Stamp newest_odometry) {
+  std::ostringstream text;
+  text << "it came after a scan that was taken later: header.stamp is " << toTime(stamp) << ", "
+       << seconds(newest_odometry - stamp) << " s before the newest odometry, " << toTime(newest_odometry)
+       << ": are the clocks synchronised?";
+  return text.str();
+}
+
 std::string frameName(const std::string& frame) {
   return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
 }
@@ -198,12 +212,12 @@ std::optional<GivenPose> toGivenPose(const geometry_msgs::PoseWithCovarianceStam
   }
   const std::optional<SE2> pose = toPlanar(message.pose.pose, problem);
   if (!pose) return std::nullopt;
-  const std::string covariance_problem = covarianceProblem(message.pose.covariance);
-  if (!covariance_problem.empty()) {
-    *problem = covariance_problem;
-    return std::nullopt;
-  }
-  return GivenPose{*pose, toPlanarCovariance(message.pose.covariance), toStamp(message.header.stamp)};
+  const GivenPose given{*pose, toPlanarCovariance(message.pose.covariance), toStamp(message.header.stamp)};
+  std::string wrong = covarianceProblem(message.pose.covariance);
+  if (wrong.empty()) wrong = problemOf(given.odom_from_base, given.covariance);
+  if (wrong.empty()) return given;
+  *problem = wrong;
+  return std::nullopt;
 }
 
 nav_msgs::Odometry toOdometryMessage(const Estimate& estimate, const std::string& odom_frame,

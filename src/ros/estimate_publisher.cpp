@@ -1,9 +1,18 @@
 #include "sckf_odometry/ros/estimate_publisher.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include "sckf_odometry/ros/constants.h"
 #include "sckf_odometry/ros/conversions.h"
 
 namespace sckf {
+
+namespace {
+
+constexpr std::size_t kMaxSent = 1000;  // transforms that may be on their way through TF
+
+}  // namespace
 
 EstimatePublisher::EstimatePublisher(ros::NodeHandle nh, const NodeOptions& options)
     : options_(options),
@@ -27,9 +36,19 @@ void EstimatePublisher::publishTransform(const Estimate& estimate) {
   if (!options_.publish_tf) return;
   // A frame has one parent: where base_frame has one already, odom_frame is hung below it.
   const SE2& pose = estimate.odom_from_base;
-  broadcaster_.sendTransform(options_.invert_odom_tf
-                                 ? toTransform(inverse(pose), estimate.stamp, options_.base_frame, options_.odom_frame)
-                                 : toTransform(pose, estimate.stamp, options_.odom_frame, options_.base_frame));
+  const geometry_msgs::TransformStamped transform =
+      options_.invert_odom_tf ? toTransform(inverse(pose), estimate.stamp, options_.base_frame, options_.odom_frame)
+                              : toTransform(pose, estimate.stamp, options_.odom_frame, options_.base_frame);
+  broadcaster_.sendTransform(transform);
+  sent_.push_back(transform);
+  if (sent_.size() > kMaxSent) sent_.pop_front();
+}
+
+bool EstimatePublisher::takeSent(const geometry_msgs::TransformStamped& transform) {
+  const auto found = std::find(sent_.begin(), sent_.end(), transform);
+  if (found == sent_.end()) return false;
+  sent_.erase(sent_.begin(), std::next(found));
+  return true;
 }
 
 void EstimatePublisher::publishScan(const Estimate& estimate, const PreparedScan* scan) {

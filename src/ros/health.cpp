@@ -12,7 +12,8 @@ namespace {
 using Status = diagnostic_msgs::DiagnosticStatus;
 using StatusWrapper = diagnostic_updater::DiagnosticStatusWrapper;
 
-/// A row of so many scans that did not correct the estimate is worth a warning.
+/// A row of so many scans that did not correct the estimate, or of so many messages that were refused, is worth a
+/// warning.
 constexpr std::size_t kManyUnused = 10;
 
 /// Messages come in lumps: a shorter silence is none [s].
@@ -33,6 +34,13 @@ void addRecent(const std::string& kind, const MessageTally::Recent& recent, Stat
   status.addf(kind + ": latency, longest [s]", "%.3f", *recent.latency_max);
 }
 
+void warnOfRefusals(const std::string& what, const MessageTally& tally, std::vector<Health::Finding>& findings) {
+  if (tally.refusedInARow() < kManyUnused) return;
+  findings.push_back({Status::WARN, "refused " + what,
+                      "none of the last " + std::to_string(tally.refusedInARow()) + " messages of " + what +
+                          " was used; the last one: " + tally.lastRefusal()});
+}
+
 std::string silenceOf(const std::string& what, double silence, const std::string& parameter, double timeout) {
   std::ostringstream text;
   text.precision(3);
@@ -49,12 +57,19 @@ Health::Health(const std::string& odometry_source, const std::vector<std::string
 
 void Health::scanCame(std::size_t laser, const ros::Time& stamp, const ros::Time& now) {
   scans.came(stamp, now);
-  lasers_[laser].came.came(stamp, now);
+  lasers_[laser].tally.came(stamp, now);
 }
+
+void Health::scanRefused(std::size_t laser, const std::string& kind, const std::string& reason, std::size_t count) {
+  scans.refused(kind, reason, count);
+  lasers_[laser].tally.refused(kind, reason, count);
+}
+
+void Health::scanAdmitted(std::size_t laser) { lasers_[laser].tally.used(); }
 
 std::string Health::topicNotHeard() const {
   for (const Laser& laser : lasers_) {
-    if (laser.came.received() == 0) return laser.topic;
+    if (!laser.tally.anyUsed()) return laser.topic;
   }
   return "";
 }
@@ -88,7 +103,8 @@ void Health::scanTaken(const ScanReport& report) {
 
 void Health::poseUpdateTaken(const PoseReport& report) {
   if (poses_in_pipeline_ > 0) --poses_in_pipeline_;
-  pose_updates.ended(toString(report.outcome));
+  const bool used = report.outcome == PoseOutcome::kUsed || report.outcome == PoseOutcome::kEntered;
+  used ? pose_updates.used(toString(report.outcome)) : pose_updates.ended(toString(report.outcome));
   poses_contradicting_ = report.outcome == PoseOutcome::kContradicts ? poses_contradicting_ + 1 : 0;
   last_pose_nis_ = report.nis;
 }
@@ -139,15 +155,19 @@ std::vector<Health::Finding> Health::findings(const Conditions& conditions, cons
          silenceOf("odometry on " + odometry_source_, odometry_silence, "odometry_timeout", odometry_timeout) +
              (options.pipeline.scans_alone ? ": the scans carry on alone" : ": the estimate waits")});
   }
+  if (now.isZero()) warn("no time", "no time on /clock, and /use_sim_time is true");
+  if (!conditions.second_parent.empty()) warn("second parent", conditions.second_parent);
   if (conditions.paused) {
     warn("paused", "paused");
     return findings;
   }
   if (!conditions.waiting_for.empty()) warn("waiting", "waiting for " + conditions.waiting_for);
+  warnOfRefusals("odometry on " + odometry_source_, odometry, findings);
   const double scan_timeout = options.node.scan_timeout;
   const bool all_silent = scans.silence(now).value_or(0.0) > scan_timeout;
   for (const Laser& laser : lasers_) {
-    const double silence = laser.came.silence(now).value_or(0.0);
+    warnOfRefusals("scans on " + laser.topic, laser.tally, findings);
+    const double silence = laser.tally.silence(now).value_or(0.0);
     if (silence <= scan_timeout) continue;
     warn("scan timeout " + laser.topic,
          silenceOf("scans on " + laser.topic, silence, "scan_timeout", scan_timeout) +
@@ -160,12 +180,23 @@ std::vector<Health::Finding> Health::findings(const Conditions& conditions, cons
   if (odometry_jumps_before_ + conditions.odometry_jumps > odometry_jumps_reported_) {
     warn("odometry jump", "the odometry on " + odometry_source_ + " jumped: not taken for motion");
   }
+  findOtherSensors(options, now, findings);
+  if (slips_ > slips_reported_) warn("slip", "the wheels slip: the scans are believed");
+  return findings;
+}
+
+void Health::findOtherSensors(const Options& options, const ros::Time& now, std::vector<Finding>& findings) const {
+  const auto warn = [&findings](const std::string& kind, const std::string& text) {
+    findings.push_back({Status::WARN, kind, text});
+  };
+  warnOfRefusals("the IMU", imu, findings);
   const double imu_timeout = std::max(options.pipeline.imu.timeout, kShortestSilence);
   const double imu_silence = imu.silence(now).value_or(0.0);
   if (imu_silence > imu_timeout) {
     warn("imu timeout", silenceOf("IMU", imu_silence, "imu_timeout", options.pipeline.imu.timeout) +
                             ": the estimate goes on without it");
   }
+  warnOfRefusals("absolute poses", pose_updates, findings);
   if (poses_contradicting_ > 0) {
     warn("pose updates", "the last " + std::to_string(poses_contradicting_) +
                              " absolute poses contradict the estimate in " + options.node.map_frame);
@@ -173,8 +204,6 @@ std::vector<Health::Finding> Health::findings(const Conditions& conditions, cons
   if (headings_contradicting_ > headings_contradicting_reported_) {
     warn("heading", "the orientation of the IMU contradicts the estimate: not used");
   }
-  if (slips_ > slips_reported_) warn("slip", "the wheels slip: the scans are believed");
-  return findings;
 }
 
 void Health::addScans(const Conditions& conditions, const ros::Time& now, StatusWrapper& status) {

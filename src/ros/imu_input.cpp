@@ -23,7 +23,7 @@ std::vector<ImuSample> ImuInput::admit(const sensor_msgs::Imu& message, Stamp ne
   const auto sample = toImuSample(message, *base_from_imu, options_, &problem);
   if (!sample) return refuse("no reading", problem);
   const auto admission = stamps_.admit(sample->stamp, *sample, now(), newest_odometry);
-  health_.imu.ended("refused, wrong stamp", admission.dropped);
+  health_.imu.refused("wrong stamp", "header.stamp does not go on from those before it", admission.dropped);
   if (admission.passed.empty()) {
     std::ostringstream text;
     text << "IMU on " << topic_ << " held back: header.stamp is " << header.stamp << ": one about "
@@ -33,15 +33,15 @@ std::vector<ImuSample> ImuInput::admit(const sensor_msgs::Imu& message, Stamp ne
   return admission.passed;
 }
 
-void ImuInput::ended(ImuBuffer::Insertion insertion) {
+void ImuInput::ended(ImuBuffer::Insertion insertion, Stamp stamp, Stamp newest_odometry) {
   switch (insertion) {
     case ImuBuffer::Insertion::kInserted:
-      return health_.imu.ended("used");
+      return health_.imu.used();
     case ImuBuffer::Insertion::kDuplicate:
-      refuse("duplicate", "there is one of the same stamp already");
+      refuse("duplicate", duplicateOf(stamp));
       return;
     case ImuBuffer::Insertion::kTooOld:
-      refuse("too late", "it came after a scan that was taken later");
+      refuse("too late", afterAScan(stamp, newest_odometry));
       return;
     case ImuBuffer::Insertion::kNotFinite:
       refuse("no reading", "its values are not finite, or larger than any can be");
@@ -50,7 +50,7 @@ void ImuInput::ended(ImuBuffer::Insertion insertion) {
 }
 
 std::vector<ImuSample> ImuInput::refuse(const std::string& kind, const std::string& reason) {
-  health_.imu.ended("refused, " + kind);
+  health_.imu.refused(kind, reason);
   warnings_.warn("imu " + kind, "IMU on " + topic_ + " not used: " + reason);
   return {};
 }

@@ -11,7 +11,8 @@ namespace sckf {
 
 namespace {
 
-constexpr char kWrongStamp[] = "refused, wrong stamp";
+constexpr char kWrongStamp[] = "wrong stamp";
+constexpr char kStray[] = "header.stamp does not go on from those before it, nor those after it from there";
 
 std::string turnedRound(const sensor_msgs::LaserScan& scan) {
   std::ostringstream text;
@@ -53,8 +54,12 @@ InputGate::Scans InputGate::admit(const Scan& message, std::size_t laser, const 
   } else {
     const Stamp stamp = toStamp(header.stamp);
     const Scans admission = scan_stamps_[laser].admit(stamp, message, now(), odometry_stamps_.newest());
-    health_.scans.ended(kWrongStamp, admission.dropped);
-    if (admission.passed.empty()) warnOfHeldBack("scan on " + scan_topics_[laser], stamp);
+    health_.scanRefused(laser, kWrongStamp, kStray, admission.dropped);
+    if (admission.passed.empty()) {
+      warnOfHeldBack("scan on " + scan_topics_[laser], stamp);
+    } else {
+      health_.scanAdmitted(laser);
+    }
     return admission;
   }
   return {};
@@ -92,18 +97,18 @@ InputGate::Samples InputGate::admit(const OdometrySample& sample) {
 
 InputGate::Samples InputGate::admitByStamp(const OdometrySample& sample) {
   const Samples admission = odometry_stamps_.admit(sample.stamp, sample, now());
-  health_.odometry.ended(kWrongStamp, admission.dropped);
+  health_.odometry.refused(kWrongStamp, kStray, admission.dropped);
   if (admission.passed.empty()) warnOfHeldBack("odometry on " + odometry_source_, sample.stamp);
   return admission;
 }
 
 void InputGate::refuseScan(std::size_t laser, const std::string& kind, const std::string& reason) {
-  health_.scans.ended("refused, " + kind);
+  health_.scanRefused(laser, kind, reason);
   warnings_.warn("scan " + kind, "scan on " + scan_topics_[laser] + " not used: " + reason);
 }
 
 void InputGate::refuseOdometry(const std::string& kind, const std::string& reason) {
-  health_.odometry.ended("refused, " + kind);
+  health_.odometry.refused(kind, reason);
   warnings_.warn("odometry " + kind, "odometry on " + odometry_source_ + " not used: " + reason);
 }
 

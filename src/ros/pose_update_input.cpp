@@ -48,7 +48,7 @@ void PoseUpdateInput::ended(const PoseReport& report) {
 }
 
 void PoseUpdateInput::refuse(const std::string& kind, const std::string& reason) {
-  health_.pose_updates.ended("refused, " + kind);
+  health_.pose_updates.refused(kind, reason);
   warnings_.warn("pose update " + kind, "pose on " + topic_ + " not used: " + reason);
 }
 

@@ -28,9 +28,11 @@ NodeOptions withOdometryOnTf(NodeOptions options) {
   return options;
 }
 
-std::vector<std::string> resolved(const ros::NodeHandle& nh, std::vector<std::string> topics) {
-  for (std::string& topic : topics) topic = nh.resolveName(topic);
-  return topics;
+std::vector<std::string> resolved(const ros::NodeHandle& nh, const std::vector<std::string>& topics) {
+  std::vector<std::string> names;
+  for (const std::string& topic : topics) names.push_back(nh.resolveName(topic));
+  checkTopics(topics, names);
+  return names;
 }
 
 Options readOptions(const ros::NodeHandle& private_nh) {
@@ -162,7 +164,7 @@ void ScKfOdometryNode::onOdometry(const nav_msgs::Odometry::ConstPtr& message) {
 void ScKfOdometryNode::onImu(const sensor_msgs::Imu::ConstPtr& message) {
   guarded([&] {
     for (const ImuSample& sample : imu_.admit(*message, gate_.newestOdometry(), tf_)) {
-      paused_ ? imu_.ended("paused") : imu_.ended(pipeline_->addImu(sample));
+      paused_ ? imu_.ended("paused") : imu_.ended(pipeline_->addImu(sample), sample.stamp, gate_.newestOdometry());
     }
     advance();
   });
@@ -181,8 +183,13 @@ void ScKfOdometryNode::onPoseUpdate(const geometry_msgs::PoseWithCovarianceStamp
 
 void ScKfOdometryNode::onTransforms(const ros::MessageEvent<const tf2_msgs::TFMessage>& event, bool is_static) {
   guarded([&] {
-    tf_.add(*event.getConstMessage(), is_static);
-    warnOfSecondParent(event);
+    const std::string& publisher = event.getPublisherName();
+    for (const geometry_msgs::TransformStamped& transform : event.getConstMessage()->transforms) {
+      // What is published from here is known. Other nodelets have the same name, that of their manager.
+      if (publisher == ros::this_node::getName() && publisher_.takeSent(transform)) continue;
+      tf_.add(transform, is_static);
+      noteSecondParent(transform, publisher, is_static);
+    }
     if (options_.node.use_tf_odometry) {
       for (const OdometrySample& sample : tf_.takeOdometry()) addOdometry(gate_.admit(sample));
     }
@@ -226,12 +233,12 @@ void ScKfOdometryNode::addOdometry(const OdometrySample& sample) {
   }
   switch (pipeline_->addOdometry(sample)) {
     case OdometryBuffer::Insertion::kInserted:
-      health_.odometry.ended("used");
+      health_.odometry.used();
       break;
     case OdometryBuffer::Insertion::kDuplicate:
-      return gate_.refuseOdometry("duplicate", "there is one of the same stamp already");
+      return gate_.refuseOdometry("duplicate", duplicateOf(sample.stamp));
     case OdometryBuffer::Insertion::kTooOld:
-      return gate_.refuseOdometry("too late", "it came after a scan that was taken later");
+      return gate_.refuseOdometry("too late", afterAScan(sample.stamp, gate_.newestOdometry()));
     case OdometryBuffer::Insertion::kNotFinite:
       return gate_.refuseOdometry("no pose", "its pose is not finite");
     case OdometryBuffer::Insertion::kAhead:
@@ -327,6 +334,7 @@ void ScKfOdometryNode::followTime(Stamp jump) {
 void ScKfOdometryNode::reset() {
   ROS_INFO_NAMED(kLogger, "reset: the estimate starts again");
   pose_keeper_.forget();
+  tf_.forgetMounts();
   begin(SE2(), Eigen::Matrix3d::Zero(), "dropped, reset");
   publisher_.clearViews();
 }
@@ -360,33 +368,35 @@ void ScKfOdometryNode::keepPose() {
   if (!problem.empty()) warnings_.warn("state file", "~state_file not written: " + problem);
 }
 
-void ScKfOdometryNode::warnOfSecondParent(const ros::MessageEvent<const tf2_msgs::TFMessage>& event) {
+void ScKfOdometryNode::noteSecondParent(const geometry_msgs::TransformStamped& transform, const std::string& publisher,
+                                        bool is_static) {
   const NodeOptions& node = options_.node;
-  if (!node.publish_tf || event.getPublisherName() == ros::this_node::getName()) return;
   const std::string& child = node.invert_odom_tf ? node.odom_frame : node.base_frame;
-  for (const auto& transform : event.getConstMessage()->transforms) {
-    if (frameName(transform.child_frame_id) != child) continue;
-    warnings_.warn("second parent", event.getPublisherName() + " publishes " + frameName(transform.header.frame_id) +
-                                        " -> " + child + " on TF too, and a frame can have one parent only: set " +
-                                        "~publish_tf to false, or ~odom_frame to a name of its own and " +
-                                        "~invert_odom_tf to true");
-  }
+  if (!node.publish_tf || second_parent_stays_ || frameName(transform.child_frame_id) != child) return;
+  const std::string parent = frameName(transform.header.frame_id);
+  // Old robot_state_publishers publish what is fixed on /tf: there its common name tells.
+  const bool is_fixed = !node.invert_odom_tf && (is_static || parent == "base_footprint");
+  second_parent_ = publisher + " publishes " + parent + " -> " + child +
+                   " on TF too, and a frame can have one parent only: set " +
+                   (is_fixed ? "~base_frame to \"" + parent + "\", which " + child + " is fixed to"
+                             : "~publish_tf to false, or ~odom_frame to a name of its own and ~invert_odom_tf to true");
+  second_parent_stays_ = is_static;
 }
 
 std::string ScKfOdometryNode::waitingFor() const {
   const NodeOptions& node = options_.node;
-  if (health_.odometry.received() == 0 && node.use_tf_odometry) {
+  if (!health_.odometry.anyUsed() && node.use_tf_odometry) {
     return "odometry on TF, " + node.tf_odometry_frame + " -> " + node.base_frame + " " + tf_.odometryProblem();
   }
-  if (health_.odometry.received() == 0) return "odometry on " + odometry_source_;
+  if (!health_.odometry.anyUsed()) return "odometry on " + odometry_source_;
   if (!scans_without_mount_.empty()) return "the mount of the laser: " + mount_problem_;
   const std::string silent = health_.topicNotHeard();
   if (!silent.empty()) return "scans on " + silent;
-  if (options_.pipeline.imu.isUsed() && health_.imu.received() == 0) return "the IMU on " + imu_.topic();
-  if (options_.pipeline.pose_updates.on && health_.pose_updates.received() == 0) {
+  if (!imu_.mountProblem().empty()) return "the mount of the IMU: " + imu_.mountProblem();
+  if (options_.pipeline.imu.isUsed() && !health_.imu.anyUsed()) return "the IMU on " + imu_.topic();
+  if (options_.pipeline.pose_updates.on && !health_.pose_updates.anyUsed()) {
     return "absolute poses on " + pose_updates_.topic();
   }
-  if (!imu_.mountProblem().empty()) return "the mount of the IMU: " + imu_.mountProblem();
   return "";
 }
 
@@ -395,6 +405,8 @@ void ScKfOdometryNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& sta
     using Level = diagnostic_msgs::DiagnosticStatus;
     Health::Conditions conditions;
     conditions.waiting_for = waitingFor();
+    conditions.second_parent = second_parent_;
+    if (!second_parent_stays_) second_parent_.clear();
     conditions.paused = paused_;
     conditions.scans_alone = pipeline_->onScansAlone();
     conditions.odometry_jumps = pipeline_->odometryJumps();

@@ -4,12 +4,16 @@
 import collections
 import copy
 import math
+import subprocess
 import unittest
 import xmlrpc.client
 
 import numpy as np
 import rosgraph
+import roslib.packages
 import rospy
+from diagnostic_msgs.msg import DiagnosticStatus
+from tf2_msgs.msg import TFMessage
 
 import junit_runner
 import run_helpers as helpers
@@ -131,7 +135,7 @@ class BadInput(unittest.TestCase):
         cls.pid = manager_pid()
         cls.recorder = helpers.Recorder()
         cls.loaders = [helpers.load_nodelet(MANAGER, '/refused', gate_probability=2.0, kf_dist_linear='far',
-                                            publish_tf=1, odom_frame='')]
+                                            publish_tf=1, odom_frame='', references_kept=16.0, scan_topics=[1, 'b'])]
         helpers.wait_until(lambda: cls.recorder.log('not started'), 'the refusal of bad parameters')
         cls.loaders.append(helpers.load_nodelet(
             MANAGER, '/sckf_odometry', kf_dist_linaer=0.3, kf_dist_linear=1, max_scan_delay=10000,
@@ -162,11 +166,41 @@ class BadInput(unittest.TestCase):
 
     def test_every_bad_parameter_is_named_with_what_is_allowed(self):
         text = self.recorder.log('not started')[0]
-        for part in ('gate_probability = 2: a number in (0, 1) expected',
+        for part in ('gate_probability = 2.0: a number in (0, 1) expected',
                      'kf_dist_linear = "far": a number in [0, 1000] m expected',
                      'publish_tf = 1: true or false expected',
-                     'odom_frame = "": a text that is not empty expected'):
+                     'odom_frame = "": a text that is not empty expected',
+                     'references_kept = 16.0: a whole number in',
+                     'scan_topics = [1, "b"]: a list of texts'):
             self.assertIn(part, text)
+
+    def test_a_node_that_does_not_start_says_why(self):
+        program = roslib.packages.find_node('sckf_odometry', 'sckf_odometry_node')[0]
+        for name, value, expected in (
+                ('gate_probability', 2, 'not started: bad parameters:\n  gate_probability = 2: a number in (0, 1) expected'),
+                ('scan_topics', ['scan', '/scan'], 'not started: scan_topics has "scan" and "/scan": both are /scan'),
+                ('scan_topics', ['a b'], 'not started: ')):
+            rospy.set_param('/alone', {name: value})
+            done = subprocess.run([program, '__name:=alone'], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                  universal_newlines=True, timeout=helpers.TIMEOUT)
+            self.assertEqual(done.returncode, 1, done.stdout)
+            self.assertIn(expected, done.stdout)
+
+    def test_another_parent_of_the_frame_is_named_and_its_own_transform_is_none(self):
+        warning = 'on TF too, and a frame can have one parent only: set ~publish_tf to false'
+        self.assertTrue(self.recorder.transforms())
+        self.assertEqual([text for _, text in self.recorder.levels() if warning in text], [])
+        driver = rospy.Publisher('/tf', TFMessage, queue_size=10)
+        transform = [t for t in self.recorder.transforms(static=False) if t.child_frame_id == 'base_link'][-1]
+
+        def warned():
+            driver.publish([transform])
+            return [(level, text) for level, text in self.recorder.levels() if warning in text]
+
+        helpers.wait_until(warned, 'word of the other parent')
+        level, text = warned()[0]
+        self.assertGreaterEqual(level, DiagnosticStatus.WARN)  # by then the wheels may be silent
+        self.assertIn('%s publishes odom -> base_link' % rospy.get_name(), text)
 
     def test_a_misspelt_parameter_is_named_with_the_one_that_is_near(self):
         self.assertEqual(self.recorder.log('unknown parameter'),

@@ -247,6 +247,12 @@ TEST(Conversions, AGivenPoseThatIsNoneIsRefusedByValueAndExpectation) {
   message = somePose();
   message.pose.covariance[35] = std::numeric_limits<double>::infinity();
   EXPECT_TRUE(contains(refusalOf(message), "finite"));
+  message = somePose();
+  message.pose.pose.position.x = 1e300;
+  EXPECT_TRUE(contains(refusalOf(message), "pose is (1e+300, 0, 1.5708): expected finite values up to 1e+09"));
+  message = somePose();
+  message.pose.covariance[0] = 1e12;
+  EXPECT_TRUE(contains(refusalOf(message), "covariance of the pose is [1e+12, 0, 0; 0, 0, 0; 0, 0, 0]: expected"));
 }
 
 TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {

@@ -57,8 +57,11 @@ TEST_F(HealthTest, ALaserThatIsSilentIsNamedAndTheOthersAreSaidToCarryOn) {
   health_ = Health("/odom", {"/front", "/rear"});
   EXPECT_EQ(health_.topicNotHeard(), "/front");
   health_.scanCame(0, at(100.0), at(100.0));
+  EXPECT_EQ(health_.topicNotHeard(), "/front");
+  health_.scanAdmitted(0);
   EXPECT_EQ(health_.topicNotHeard(), "/rear");
   health_.scanCame(1, at(100.0), at(100.0));
+  health_.scanAdmitted(1);
   EXPECT_EQ(health_.topicNotHeard(), "");
   health_.scanCame(0, at(103.0), at(103.0));
   Verdict verdict = verdictAt(103.0);
@@ -143,9 +146,53 @@ TEST_F(HealthTest, ManyScansInARowThatDidNotHelpAreAWarning) {
   EXPECT_EQ(verdictAt(100.1).level, Level::OK);
 }
 
+TEST_F(HealthTest, MessagesOfWhichNoneIsUsedAreAWarningWithTheReason) {
+  options_.pipeline.imu.gyro = options_.pipeline.pose_updates.on = true;
+  health_ = Health("/odom", {"/front", "/rear"});
+  const auto refuse = [this](int count) {
+    for (int i = 0; i < count; ++i) {
+      health_.odometry.refused("no stamp", "header.stamp is 0");
+      health_.scanRefused(1, "no frame", "header.frame_id is empty");
+      health_.scanAdmitted(0);
+      health_.imu.refused("no reading", "angular_velocity (0, 0, nan)");
+      health_.pose_updates.refused("no pose", "position (nan, 0)");
+    }
+  };
+  refuse(9);
+  EXPECT_EQ(verdictAt(100.1).level, Level::OK);
+  refuse(1);
+  const Verdict verdict = verdictAt(100.1);
+  EXPECT_EQ(verdict.level, Level::WARN);
+  EXPECT_EQ(verdict.text,
+            "none of the last 10 messages of odometry on /odom was used; the last one: header.stamp is 0; "
+            "none of the last 10 messages of scans on /rear was used; the last one: header.frame_id is empty; "
+            "none of the last 10 messages of the IMU was used; the last one: angular_velocity (0, 0, nan); "
+            "none of the last 10 messages of absolute poses was used; the last one: position (nan, 0)");
+  EXPECT_EQ(value("odometry: refused, no stamp"), "10");
+  health_.odometry.used();
+  health_.scanAdmitted(1);
+  health_.imu.used();
+  PoseReport pose;
+  pose.outcome = PoseOutcome::kUsed;
+  health_.poseUpdateTaken(pose);
+  EXPECT_EQ(verdictAt(100.2).level, Level::OK);
+}
+
+TEST_F(HealthTest, WithoutATimeItWarns) {
+  const Verdict verdict = verdictAt(0.0);
+  EXPECT_EQ(verdict.level, Level::WARN);
+  EXPECT_EQ(verdict.text, "no time on /clock, and /use_sim_time is true");
+}
+
+TEST_F(HealthTest, ASecondParentOfTheFrameIsAWarning) {
+  conditions_.second_parent = "/driver publishes odom -> base_link on TF too";
+  EXPECT_EQ(verdictAt(100.1).level, Level::WARN);
+  EXPECT_EQ(verdictAt(100.1).text, conditions_.second_parent);
+}
+
 TEST_F(HealthTest, EveryScanIsAccountedFor) {
   for (int i = 0; i < 6; ++i) health_.scanCame(0, at(100.0), at(100.0));  // with the first: 7
-  health_.scans.ended("refused, no stamp");
+  health_.scanRefused(0, "no stamp", "header.stamp is 0");
   for (int i = 0; i < 4; ++i) health_.scanPassed();
   health_.scanTaken(scan(ScanOutcome::kReference, 100.1));
   health_.scanTaken(scan(ScanOutcome::kOutOfOrder, 100.1, "not newer"));
@@ -182,6 +229,19 @@ TEST_F(HealthTest, RatesAndLatenciesAreThoseSinceTheLastReport) {
   verdictAt(101.0);
   EXPECT_EQ(value("odometry: rate [1/s]"), "0.0");
   EXPECT_EQ(value("odometry: latency, mean [s]"), "missing");
+}
+
+TEST_F(HealthTest, AMessageWithoutStampHasNoLatency) {
+  verdictAt(100.0);
+  health_.odometry.came(ros::Time(), at(100.5));
+  verdictAt(101.0);
+  EXPECT_EQ(value("odometry: rate [1/s]"), "1.0");
+  EXPECT_EQ(value("odometry: latency, mean [s]"), "missing");
+  health_.odometry.came(at(101.2), at(101.5));
+  health_.odometry.came(ros::Time(), at(101.5));
+  verdictAt(102.0);
+  EXPECT_EQ(value("odometry: latency, mean [s]"), "0.300");
+  EXPECT_EQ(value("odometry: latency, longest [s]"), "0.300");
 }
 
 TEST_F(HealthTest, TheLastComparisonAndTheAgeOfTheReferenceAreTold) {

@@ -153,11 +153,22 @@ TEST_F(ImuInputTest, WhatThePipelineMadeOfItIsCounted) {
   admit(imu(1000.0, 0.0, 0.0, Eigen::Quaterniond::Identity()));
   for (const auto insertion : {ImuBuffer::Insertion::kInserted, ImuBuffer::Insertion::kDuplicate,
                                ImuBuffer::Insertion::kTooOld, ImuBuffer::Insertion::kNotFinite}) {
-    input_->ended(insertion);
+    input_->ended(insertion, std::chrono::seconds(1000), std::chrono::milliseconds(1000500));
   }
   EXPECT_THAT(health_.imu.ends(),
               ElementsAre(Pair("refused, duplicate", 1U), Pair("refused, no mount", 1U),
                           Pair("refused, no reading", 1U), Pair("refused, too late", 1U), Pair("used", 1U)));
+}
+
+TEST_F(ImuInputTest, WhyThePipelineRefusedItIsSaidWithTheStamps) {
+  input_ = std::make_unique<ImuInput>(options_, "/imu", 1.0, health_, warnings_);
+  const Stamp stamp = std::chrono::seconds(1000);
+  input_->ended(ImuBuffer::Insertion::kDuplicate, stamp, stamp);
+  EXPECT_EQ(health_.imu.lastRefusal(), "header.stamp is 1000.000000000: there is one of that stamp already");
+  input_->ended(ImuBuffer::Insertion::kTooOld, stamp, stamp + std::chrono::milliseconds(500));
+  EXPECT_EQ(health_.imu.lastRefusal(),
+            "it came after a scan that was taken later: header.stamp is 1000.000000000, 0.5 s before the newest "
+            "odometry, 1000.500000000: are the clocks synchronised?");
 }
 
 }  // namespace

@@ -24,6 +24,10 @@ Stamp toStamp(const ros::Time& time);
 Stamp now();
 ros::Time toTime(Stamp stamp);
 
+/// Why odometry or a reading of an IMU is refused: another has its stamp; a scan that was taken later has been used.
+std::string duplicateOf(Stamp stamp);
+std::string afterAScan(Stamp stamp, Stamp newest_odometry);
+
 /// The name without the leading slash that old drivers put before it and tf2 refuses.
 std::string frameName(const std::string& frame);
 

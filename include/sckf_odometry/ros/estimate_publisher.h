@@ -5,6 +5,7 @@
 #include <ros/publisher.h>
 #include <tf2_ros/transform_broadcaster.h>
 
+#include <deque>
 #include <optional>
 
 #include "sckf_odometry/ros/parameters.h"
@@ -35,6 +36,9 @@ class EstimatePublisher {
   /// A new estimate begins, and a new time.
   void restart();
 
+  /// Whether a transform that came back from TF is one that was sent here; each comes back once, in order.
+  bool takeSent(const geometry_msgs::TransformStamped& transform);
+
  private:
   void publishTransform(const Estimate& estimate);
 
@@ -45,6 +49,7 @@ class EstimatePublisher {
   ros::Publisher path_odometry_;
   ros::Publisher cloud_;
   tf2_ros::TransformBroadcaster broadcaster_;
+  std::deque<geometry_msgs::TransformStamped> sent_;  // and not yet come back
 
   std::optional<Estimate> last_published_;
   std::optional<SE2> odom_from_wheels_;  // where the frame of the driver's odometry is in odom

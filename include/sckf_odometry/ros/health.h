@@ -17,7 +17,8 @@ class Health {
  public:
   /// What only the node knows, at the time of a report.
   struct Conditions {
-    std::string waiting_for;  ///< empty if for nothing
+    std::string waiting_for;    ///< empty if for nothing
+    std::string second_parent;  ///< who else publishes the transform of the estimate, and what to do; empty if nobody
     bool paused = false;
     bool scans_alone = false;            ///< wheels are silent, and scans carry on
     std::size_t odometry_jumps = 0;      ///< steps of the wheels that were not taken for motion
@@ -44,7 +45,10 @@ class Health {
   MessageTally pose_updates;  ///< if they are used
 
   void scanCame(std::size_t laser, const ros::Time& stamp, const ros::Time& now);
-  /// The topic of a laser of which no scan has come; empty if there is none.
+  void scanRefused(std::size_t laser, const std::string& kind, const std::string& reason, std::size_t count = 1);
+  /// Nothing is wrong with it by itself, nor with its stamp.
+  void scanAdmitted(std::size_t laser);
+  /// The topic of a laser of which no scan that could be used has come; empty if there is none.
   std::string topicNotHeard() const;
 
   /// The scan went to the pipeline, and will be reported, unless the pipeline is dropped before.
@@ -63,6 +67,7 @@ class Health {
 
  private:
   std::vector<Finding> findings(const Conditions& conditions, const Options& options, const ros::Time& now) const;
+  void findOtherSensors(const Options& options, const ros::Time& now, std::vector<Finding>& findings) const;
   void addScans(const Conditions& conditions, const ros::Time& now,
                 diagnostic_updater::DiagnosticStatusWrapper& status);
   void addOdometry(const Conditions& conditions, const ros::Time& now,
@@ -75,7 +80,7 @@ class Health {
   std::string odometry_source_;
   struct Laser {
     std::string topic;
-    MessageTally came;
+    MessageTally tally;        // how they ended: only as far as they were admitted or refused
     LaserConstants constants;  // variance zero: not estimated
   };
   std::vector<Laser> lasers_;

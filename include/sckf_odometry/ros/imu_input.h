@@ -23,8 +23,8 @@ class ImuInput {
   /// if there is none.
   std::vector<ImuSample> admit(const sensor_msgs::Imu& message, Stamp newest_odometry, TfInput& tf);
 
-  /// What the pipeline made of a sample.
-  void ended(ImuBuffer::Insertion insertion);
+  /// What the pipeline made of a sample. newest_odometry: as above.
+  void ended(ImuBuffer::Insertion insertion, Stamp stamp, Stamp newest_odometry);
   /// It was not looked at, for a reason in words.
   void ended(const std::string& how) { health_.imu.ended(how); }
 

@@ -86,7 +86,7 @@ class ScKfOdometryNode {
   void pause(bool paused);
   void keepPose();
 
-  void warnOfSecondParent(const ros::MessageEvent<const tf2_msgs::TFMessage>& event);
+  void noteSecondParent(const geometry_msgs::TransformStamped& transform, const std::string& publisher, bool is_static);
   std::string waitingFor() const;  ///< empty if for nothing
 
   Options options_;
@@ -110,7 +110,9 @@ class ScKfOdometryNode {
     Scan message;
   };
   std::deque<ScanWithoutMount> scans_without_mount_;
-  std::string mount_problem_;  // of the newest scan that waits for its mount
+  std::string mount_problem_;         // of the newest scan that waits for its mount
+  std::string second_parent_;         // since the last report of the diagnostics
+  bool second_parent_stays_ = false;  // it is on /tf_static
   bool paused_ = false;
 
   // What calls back comes last, so that it is the first to go.
