@@ -20,6 +20,8 @@ void checkPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance) {
   if (!problem.empty()) throw std::invalid_argument(problem);
 }
 
+constexpr double kLongLate = 0.5;  // [s] messages are not on their way for longer: the sensors' clocks may differ
+
 /// The end of a reason: a stamp beside those of the odometry at hand.
 std::string besideOdometry(Stamp stamp, const OdometryBuffer& odometry) {
   std::ostringstream text;
@@ -27,8 +29,8 @@ std::string besideOdometry(Stamp stamp, const OdometryBuffer& odometry) {
   if (odometry.empty()) return text.str() + "there is no odometry";
   text << "those of the odometry are " << seconds(odometry.oldest()) << " to " << seconds(odometry.newest()) << " s";
   if (odometry.covers(stamp)) return text.str();
-  const Stamp apart = std::max(odometry.oldest() - stamp, stamp - odometry.newest());
-  text << ", " << seconds(apart) << " s away: are the clocks synchronised?";
+  const double apart = seconds(std::max(odometry.oldest() - stamp, stamp - odometry.newest()));
+  text << ", " << apart << " s away" << (apart > kLongLate ? ": are the clocks synchronised?" : "");
   return text.str();
 }
 

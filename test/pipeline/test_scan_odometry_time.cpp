@@ -188,7 +188,7 @@ TEST(ScanOdometryTime, AScanBeforeTheFirstOdometryHasNone) {
   driven.odometry(520);
   expectIgnored(driven, drive.scan(499), ScanOutcome::kNoOdometry, "older than the odometry");
   EXPECT_THAT(driven.reports.back().reason, testing::HasSubstr("0.499 s, those of the odometry are "));
-  EXPECT_THAT(driven.reports.back().reason, testing::EndsWith(", 0.001 s away: are the clocks synchronised?"));
+  EXPECT_THAT(driven.reports.back().reason, testing::EndsWith(", 0.001 s away"));
   driven.scan(507);
   EXPECT_EQ(driven.reports.back().outcome, ScanOutcome::kReference);
 }
@@ -208,7 +208,7 @@ TEST(ScanOdometryTime, OfTooManyWaitingScansTheOldestAreGivenUp) {
     EXPECT_EQ(driven.reports[i].stamp, at(107 + 100 * static_cast<int>(i)));
     EXPECT_EQ(driven.reports[i].outcome, ScanOutcome::kNoOdometry);
     EXPECT_THAT(driven.reports[i].reason, testing::HasSubstr("too many scans wait"));
-    EXPECT_THAT(driven.reports[i].reason, testing::HasSubstr("s away: are the clocks synchronised?"));
+    EXPECT_THAT(driven.reports[i].reason, testing::EndsWith("s away"));
     EXPECT_FALSE(driven.reports[i].estimate);
   }
   expectNear(before, *driven.pipeline.latest(), 0.0);
@@ -362,7 +362,7 @@ TEST(ScanOdometryTime, AStampThatIsNoTimeIsRefusedWithTheValue) {
   }
   LaserScan zero = drive.scan(1000);
   zero.stamp = Stamp(0);
-  expectIgnored(driven, zero, ScanOutcome::kNoOdometry, "older than the odometry");
+  expectIgnored(driven, zero, ScanOutcome::kNoOdometry, "s away: are the clocks synchronised?");
 }
 
 /// Each scan three times: once used, twice out of order, and the estimate as if it had come once.

@@ -165,10 +165,12 @@ TEST_F(ImuInputTest, WhyThePipelineRefusedItIsSaidWithTheStamps) {
   const Stamp stamp = std::chrono::seconds(1000);
   input_->ended(ImuBuffer::Insertion::kDuplicate, stamp, stamp);
   EXPECT_EQ(health_.imu.lastRefusal(), "header.stamp is 1000.000000000: there is one of that stamp already");
-  input_->ended(ImuBuffer::Insertion::kTooOld, stamp, stamp + std::chrono::milliseconds(500));
+  const std::string late = "it came after a scan that was taken later: header.stamp is 1000.000000000, ";
+  input_->ended(ImuBuffer::Insertion::kTooOld, stamp, stamp + std::chrono::milliseconds(100));
+  EXPECT_EQ(health_.imu.lastRefusal(), late + "0.1 s before the newest odometry, 1000.100000000");
+  input_->ended(ImuBuffer::Insertion::kTooOld, stamp, stamp + std::chrono::seconds(3));
   EXPECT_EQ(health_.imu.lastRefusal(),
-            "it came after a scan that was taken later: header.stamp is 1000.000000000, 0.5 s before the newest "
-            "odometry, 1000.500000000: are the clocks synchronised?");
+            late + "3 s before the newest odometry, 1003.000000000: are the clocks synchronised?");
 }
 
 }  // namespace
