@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Dict, List, Optional, Sequence
@@ -69,7 +70,12 @@ def simulate(setting: Setting, name: str) -> None:
 
 
 def read_table(path: Path) -> np.ndarray:
-    return np.atleast_1d(np.genfromtxt(path, delimiter=",", names=True, dtype=None, encoding="utf-8"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of no rows, which is told below
+        table = np.atleast_1d(np.genfromtxt(path, delimiter=",", names=True, dtype=None, encoding="utf-8"))
+    if table.size == 0:
+        raise ExperimentError(f"{path}: expected rows, there are none: with these options nothing is simulated")
+    return table
 
 
 def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

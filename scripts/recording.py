@@ -25,7 +25,7 @@ class Recording:
     """Scans in the order of their stamps, points (n x 2) [m] in the robot's frame."""
     stamps: np.ndarray
     clouds: List[np.ndarray]
-    wheels: Trajectory
+    wheels: Optional[Trajectory]
     estimate: Optional[Trajectory]
     latencies: np.ndarray  # [s] of the bag's clock from the scan's arrival to the estimate's, of scans that have both
 
@@ -36,9 +36,6 @@ def read_recording(path: str, topics: Topics = Topics()) -> Recording:
     scans = sorted(messages[topics.scan], key=lambda pair: pair[0].header.stamp)
     if not scans:
         raise TrajectoryError(f"{path}: no scans on {topics.scan}")
-    wheels = _trajectory(messages[topics.odometry])
-    if wheels is None:
-        raise TrajectoryError(f"{path}: no wheel odometry on {topics.odometry}")
     transforms = _mounts(messages["/tf"] + messages["/tf_static"])
     mounts: Dict[str, np.ndarray] = {}
     for scan, _ in scans:
@@ -47,8 +44,8 @@ def read_recording(path: str, topics: Topics = Topics()) -> Recording:
             mounts[frame] = _mount(frame, topics.base_frame, transforms, path)
     clouds = [scan_points(scan, mounts[scan.header.frame_id.lstrip("/")]) for scan, _ in scans]
     estimates = next((messages[topic] for topic in topics.estimate if messages[topic]), [])
-    return Recording(np.array([scan.header.stamp.to_sec() for scan, _ in scans]), clouds, wheels,
-                     _trajectory(estimates), _latencies(scans, estimates))
+    return Recording(np.array([scan.header.stamp.to_sec() for scan, _ in scans]), clouds,
+                     _trajectory(messages[topics.odometry]), _trajectory(estimates), _latencies(scans, estimates))
 
 
 def halved(path: str, output: str, scan_topic: str = "/scan") -> None:

@@ -5,12 +5,15 @@ import argparse
 import csv
 import tempfile
 from pathlib import Path
-from typing import Dict, List, Sequence
+from typing import Any, Dict, List, Optional, Sequence
 
 import numpy as np
+import yaml
 
+from argument_types import not_negative, topic
 from programs import run_program
 from recording import Topics
+from trajectory import TrajectoryError
 
 AXES = ("x", "y", "yaw")
 Row = Dict[str, str]
@@ -20,14 +23,14 @@ def add_log_arguments(parser: argparse.ArgumentParser) -> None:
     """The log, and how it is to be replayed."""
     parser.add_argument("bag")
     parser.add_argument("--params", help="parameter file, as config/sckf_odometry.yaml")
-    parser.add_argument("--scan-topic", default=Topics.scan)
-    parser.add_argument("--odom-topic", default=Topics.odometry)
+    parser.add_argument("--scan-topic", type=topic, help="of one laser, instead of the parameter file's scan_topics")
+    parser.add_argument("--odom-topic", type=topic, default=Topics.odometry)
 
 
 def add_reference_arguments(parser: argparse.ArgumentParser) -> None:
     """A reference trajectory, and how far it is to be believed."""
     parser.add_argument("--reference", metavar="TUM", help="the reference trajectory, of base_link at the scans")
-    parser.add_argument("--reference-std", nargs=2, type=float, default=(0.02, 0.3), metavar=("M", "DEG"),
+    parser.add_argument("--reference-std", nargs=2, type=not_negative, default=(0.02, 0.3), metavar=("M", "DEG"),
                         help="its own error between two scans, for the NEES (default: 0.02 0.3)")
 
 
@@ -37,12 +40,27 @@ def reference_covariance(log: argparse.Namespace) -> np.ndarray:
     return np.diag(np.square([meters, meters, np.radians(degrees)]))
 
 
+def read_params(path: Optional[str]) -> Dict[str, Any]:
+    """What a parameter file gives; nothing without one."""
+    if not path:
+        return {}
+    try:
+        given = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise TrajectoryError(f"--params {path}: expected a parameter file (YAML): {error}") from error
+    if given is not None and not isinstance(given, dict):
+        raise TrajectoryError(f"--params {path}: expected lines 'parameter: value', as in config/sckf_odometry.yaml")
+    return given or {}
+
+
 def scan_table(log: argparse.Namespace, options: Sequence[object] = ()) -> List[Row]:
     """The rows of replay's table, for a log as add_log_arguments takes it; further options as replay takes them."""
     with tempfile.TemporaryDirectory() as folder:
         table = Path(folder) / "scans.csv"
-        arguments = [log.bag, "--csv", table, "--scan-topic", log.scan_topic, "--odom-topic", log.odom_topic, *options]
-        run_program("replay", arguments + (["--params", log.params] if log.params else []))
+        arguments = [log.bag, "--csv", table, "--odom-topic", log.odom_topic, *options]
+        for option, value in ("--scan-topic", log.scan_topic), ("--params", log.params):
+            arguments += [option, value] if value else []
+        run_program("replay", arguments)
         with open(table, newline="", encoding="utf-8") as file:
             return list(csv.DictReader(file))
 

@@ -239,6 +239,10 @@ class CommandLine(unittest.TestCase):
             for arguments, told in ((["five_methods", "--output", folder], "five_methods"),
                                     (["four_methods", "--output", folder, "--range-std", "1"], "--range-std"),
                                     (["complexity", "--output", folder, "--no-such"], "no-such"),
+                                    (["complexity", "--output", folder, "--runs", "-1"], "--runs -1: expected 2 or more"),
+                                    (["visual_odometry", "--output", folder, "--runs", "1"], "--runs 1: expected"),
+                                    (["line_matching", "--output", folder, "--runs", "2", "--laps", "0"], "line_matching"),
+                                    (["four_methods", "--output", folder, "--scan-topic", ""], "--scan-topic: expected"),
                                     (["four_methods", "--output", folder, "--bag", "/no/such.bag"], "such.bag")):
                 done = experiment(arguments)
                 self.assertNotEqual(done.returncode, 0, arguments)

@@ -9,9 +9,20 @@ import subprocess
 import tempfile
 import unittest
 from pathlib import Path
+from typing import Dict
+
+import rosbag
 
 ROOT = Path(__file__).resolve().parents[2]
 BIN = Path(os.environ.get("SCKF_BIN_DIR", ROOT / "build" / "devel" / "lib" / "sckf_odometry"))
+
+
+def rename_topics(bag: str, output: str, names: Dict[str, str]) -> None:
+    """Writes the bag with other names; what gets an empty one is left out."""
+    with rosbag.Bag(bag) as source, rosbag.Bag(output, "w") as out:
+        for topic, message, stamp in source.read_messages():
+            if names.get(topic, topic):
+                out.write(names.get(topic, topic), message, stamp)
 
 
 class ScriptCase(unittest.TestCase):

@@ -17,7 +17,8 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "test" / "ros"), str(ROOT / "test" / "accuracy"), str(ROOT / "scripts")]
 import simulated_bag  # noqa: E402
-from script_case import BIN, ScriptCase  # noqa: E402
+from recording import halved  # noqa: E402
+from script_case import BIN, ScriptCase, rename_topics  # noqa: E402
 from wheel_calibration import calibrate  # noqa: E402
 from worse_wheels import worsen  # noqa: E402
 
@@ -94,8 +95,8 @@ class BagTest(ScriptCase):
         simulated_bag.write(cls.path("short.bag"), duration=3.0, path=weaving)
         worsen(cls.path("drive.bag"), cls.path("worse.bag"), longer_and_turned)
 
-    def told(self, bag: str) -> Dict[str, float]:
-        said = self.said(self.path(bag))
+    def told(self, bag: str, *arguments: str) -> Dict[str, float]:
+        said = self.said(self.path(bag), *arguments)
         patterns = {"way": r"way is longer.* by +(\S+) %", "turn": r"with the way.* by +(\S+) °/m",
                     "ahead": r"laser is farther.* by +(\S+) m"}
         return {name: float(re.search(pattern, said).group(1)) for name, pattern in patterns.items()}
@@ -120,6 +121,38 @@ class BagTest(ScriptCase):
                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
         self.assertEqual(replay.returncode, 0, replay.stdout)
         self.assertEqual(len(params.read_text(encoding="utf-8").strip().splitlines()), 5)
+
+    def params(self, text: str) -> str:
+        path = Path(self.path("given.yaml"))
+        path.write_text(text, encoding="utf-8")
+        return str(path)
+
+    def test_the_laser_is_that_of_the_parameter_file(self) -> None:
+        rename_topics(self.path("drive.bag"), self.path("front.bag"), {"/scan": "/front/scan", "/odom": "/wheels"})
+        front = self.params("scan_topics: [front/scan]\n")
+        self.assertEqual(self.told("front.bag", "--params", front, "--odom-topic", "wheels"), self.told("drive.bag"))
+
+    def test_of_two_lasers_the_first_or_the_one_that_is_named(self) -> None:
+        halved(self.path("drive.bag"), self.path("halves.bag"))
+        both = ("--params", self.params("scan_topics: [right/scan, left/scan]\n"))
+        right, left = (self.told("halves.bag", "--scan-topic", side + "/scan") for side in ("right", "left"))
+        self.assertNotEqual(right, left)
+        self.assertEqual(self.told("halves.bag", *both), right)
+        self.assertEqual(self.told("halves.bag", *both, "--scan-topic", "left/scan"), left)
+
+    def test_clouds(self) -> None:
+        simulated_bag.write(self.path("clouds.bag"), duration=20.0, path=weaving, clouds=True)
+        self.assertAlmostEqual(self.told("clouds.bag", "--params", self.params("use_cloud_input: true\n"))["way"],
+                               100 * (1 / 1.03 - 1), delta=2.0)
+
+    def test_a_parameter_file_that_is_none_is_named(self) -> None:
+        drive = self.path("drive.bag")
+        text = self.params("a robot's notes\n")
+        self.assertIn(f"--params {text}: expected lines 'parameter: value'", self.refused(drive, "--params", text))
+        for other in (drive, self.params("method: [sckf\n"), "/no/such.yaml"):
+            said = self.refused(drive, "--params", other)
+            self.assertIn(f"--params {other}: expected a parameter file (YAML): ", said)
+            self.assertNotIn("Traceback", said)
 
     def test_too_short_a_log_is_refused(self) -> None:
         done = self.run_script(self.path("short.bag"))

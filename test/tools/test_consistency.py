@@ -152,6 +152,7 @@ class BagTest(ScriptCase):
         self.assertRegex(self.refused(drive, "--reference", true, "--length", "500"), "true.tum: no window of 500 m")
         self.assertIn("--length 0: expected more than 0 m", self.refused(drive, "--length", "0"))
         self.assertIn("--windows 0: expected 1 or more", self.refused(drive, "--windows", "0"))
+        self.assertIn("--reference-std: expected 0 or more, finite: nan", self.refused(drive, "--reference-std", "nan", "0"))
 
 
 if __name__ == "__main__":

@@ -221,11 +221,13 @@ class CommandTest(unittest.TestCase):
 
     def test_bad_input_is_told_without_a_traceback(self) -> None:
         both = [str(self.reference), str(self.estimate)]
-        for arguments in (["none.tum", str(self.estimate)], [*both, "--lengths=0"], [*both, "--point", "inf", "0"]):
+        for arguments in (["none.tum", str(self.estimate)], [*both, "--lengths=0"], [*both, "--point", "inf", "0"],
+                          [*both, "--max-gap", "nan"], [*both, "--max-gap", "-1"], [*both, "--max-gap", "soon"]):
             done = self.run_evaluate(*arguments)
             self.assertNotEqual(done.returncode, 0)
             self.assertNotIn("Traceback", done.stderr)
-            self.assertRegex(done.stderr, "none.tum: No such file|every length must be positive|a finite number of metres: inf")
+            self.assertRegex(done.stderr, "none.tum: No such file|every length must be positive|a finite number of metres: inf|"
+                             "--max-gap: expected (0 or more, finite: (nan|-1)|a number: soon)")
 
 
 @unittest.skipUnless(os.environ.get("SCKF_DATA"), "SCKF_DATA does not name the folder of recorded logs")

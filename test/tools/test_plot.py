@@ -180,7 +180,8 @@ class BagTest(unittest.TestCase):
     def test_table_picture_and_trajectories(self) -> None:
         write_bag(self.bag)
         picture = self.folder / "run.png"
-        done = self.run_plot("--latency", "--output", str(picture), "--tum", str(self.folder / "run"))
+        done = self.run_plot("--latency", "--output", str(picture), "--tum", str(self.folder / "run"), "--scan-topic",
+                             "scan", "--odom-topic", "odom")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertRegex(done.stdout, r"at the end +0\.\d\d m +\d+\.\d\d° +0\.0[01] m +0\.[0-3]\d°")
         self.assertRegex(done.stdout, r"median 4\.0 ms.*longest 4\.0 ms \(139 scans\)")
@@ -195,8 +196,8 @@ class BagTest(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("another", done.stdout)
 
-    def check_complaint(self, complaint: str) -> None:
-        done = self.run_plot()
+    def check_complaint(self, complaint: str, *arguments: str) -> None:
+        done = self.run_plot(*arguments)
         self.assertEqual(done.returncode, 1)
         self.assertIn(complaint, done.stderr)
         self.assertNotIn("Traceback", done.stderr)
@@ -205,6 +206,7 @@ class BagTest(unittest.TestCase):
         self.check_complaint("run.bag")
         write_bag(self.bag, estimate=False)
         self.check_complaint("no estimate on /pose or /odometry/filtered")
+        self.check_complaint("no wheel odometry on /wheels; see --odom-topic", "--odom-topic", "wheels")
         write_bag(self.bag, mount=False)
         self.check_complaint("TF does not lead from the scans' frame 'laser' to 'base_link'")
         with self.assertRaisesRegex(TrajectoryError, "not appear to be a bag"):

@@ -1,0 +1,22 @@
+"""Values of the command line that the scripts share, refused where they cannot be."""
+from __future__ import annotations
+
+import argparse
+import math
+
+
+def topic(text: str) -> str:
+    """With the slash that a bag has before each name, as replay takes it."""
+    if not text.strip("/"):
+        raise argparse.ArgumentTypeError(f"expected the name of a topic: '{text}'")
+    return text if text.startswith("/") else f"/{text}"
+
+
+def not_negative(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"expected a number: {text}") from error
+    if not (math.isfinite(value) and value >= 0.0):
+        raise argparse.ArgumentTypeError(f"expected 0 or more, finite: {text}")
+    return value
