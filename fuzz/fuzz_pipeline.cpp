@@ -7,6 +7,8 @@
 #include <limits>
 #include <sstream>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "matching/simulated_world.h"
 #include "sckf_odometry/pipeline/scan_odometry.h"
@@ -37,8 +39,13 @@ class Bytes {
     return value;
   }
 
-  int upTo(int limit) { return any<std::uint8_t>() % (limit + 1); }
+  int upTo(int limit) { return any<std::uint8_t>() % (limit + 1); }  ///< the limit itself, too
   bool chance() { return upTo(1) == 1; }
+
+  template <typename Value>
+  const Value& oneOf(const std::vector<Value>& values) {
+    return values[static_cast<std::size_t>(upTo(static_cast<int>(values.size()) - 1))];
+  }
 
   /// A number of the given size, seldom one of any size or none at all.
   double number(double size) {
@@ -80,14 +87,14 @@ void switchOthersOn(PipelineOptions& options, Bytes& bytes) {
   options.imu.orientation = can && bytes.chance();
   options.pose_updates.on = can && bytes.chance();
   options.standstill.time = can ? 0.2 * bytes.upTo(2) : 0.0;
-  const auto use = static_cast<std::size_t>(bytes.upTo(3));
-  options.landmarks.use = can && !options.pose_updates.on ? landmarkUses()[use] : "none";
+  options.landmarks.use = can ? bytes.oneOf(landmarkUses()) : "none";
   options.landmarks.only = options.landmarks.on() && bytes.chance();
+  options.lasers = can ? 1 + static_cast<std::size_t>(bytes.upTo(2)) : 1;
 }
 
 PipelineOptions options(Bytes& bytes) {
   PipelineOptions options;
-  options.method = fusionMethodNames()[static_cast<std::size_t>(bytes.upTo(5))];
+  options.method = bytes.oneOf(fusionMethodNames());
   options.scans_alone = bytes.chance();
   options.prefer_twist_covariance = bytes.chance();
   options.max_waiting_scans = 1 + bytes.upTo(kMostWaiting - 1);
@@ -96,7 +103,7 @@ PipelineOptions options(Bytes& bytes) {
   options.reference.kf_dist_linear = 0.5 * bytes.upTo(2);
   options.gate.trust_scans_on_slip = bytes.chance();
   options.deskew = bytes.chance();
-  options.odometry_noise.model = odometryModelNames()[static_cast<std::size_t>(bytes.upTo(2))];
+  options.odometry_noise.model = bytes.oneOf(odometryModelNames());
   options.landmarks.max = 1 + bytes.upTo(9);
   options.scan.max_beams = bytes.chance() ? 60 : 400;
   switchOthersOn(options, bytes);
@@ -297,7 +304,8 @@ class Driver {
     Eigen::Isometry3d mount = Eigen::Isometry3d::Identity();
     if (bytes_.upTo(15) == 0) mount.translation().x() = bytes_.number(2.0);
     if (bytes_.upTo(15) == 0) mount.rotate(Eigen::AngleAxisd(bytes_.number(M_PI), Eigen::Vector3d::UnitX()));
-    pipeline_.addScan(scan, mount);
+    const int last = static_cast<int>(pipeline_.options().lasers) - 1;
+    pipeline_.addScan(scan, mount, static_cast<std::size_t>(bytes_.upTo(last)));
     ++scans_;
   }
 
@@ -313,12 +321,14 @@ class Driver {
     PipelineOptions changed = options(bytes_);
     changed.method = pipeline_.options().method;
     switchOthersOn(changed, bytes_);
+    changed.lasers = pipeline_.options().lasers;
     pipeline_.setOptions(changed);
   }
 
   void check() {
     for (const ScanReport& report : pipeline_.process()) {
       ++reported_;
+      require(report.laser < pipeline_.options().lasers, "a report is of a laser that there is");
       if (report.estimate) requireSound(*report.estimate);
       if (report.in_map) requireSound(*report.in_map);
       require(report.calibration.error.allFinite() && std::isfinite(report.gyro_bias.value), "states are finite");
