@@ -61,8 +61,8 @@ SimulatedScan RoomSimulation::scan(const SE2& odom_from_base, RandomDraws& rando
 
 RoomSimulation::Problem RoomSimulation::problem(const SimulatedScan& reference, const SimulatedScan& current) const {
   const SE2 reference_from_current = between(reference.odom_from_base, current.odom_from_base);
-  Problem p{Eigen::MatrixXd::Zero(kBeams, 3), Eigen::MatrixXd::Zero(kBeams, kBeams),
-            Eigen::MatrixXd::Zero(kBeams, kBeams)};
+  Problem p{Eigen::MatrixXd::Zero(kBeams, 3), std::vector<int>(kBeams, -1), Eigen::VectorXd::Zero(kBeams),
+            Eigen::VectorXd::Zero(kBeams)};
   for (int beam = 0; beam < kBeams; ++beam) {
     if (current.wall[beam] < 0) continue;
     const Eigen::Vector2d point = reference_from_current * current.points[beam];
@@ -72,8 +72,9 @@ RoomSimulation::Problem RoomSimulation::problem(const SimulatedScan& reference, 
         reference.odom_from_base.rotation().transpose() * walls_[current.wall[beam]].normal;  // in the reference
     const Eigen::Vector2d lever = point - reference_from_current.translation();
     p.A.row(beam) << normal.transpose(), normal.dot(Eigen::Vector2d(-lever.y(), lever.x()));
-    p.by_reference(beam, partner) = -normal.dot(beamDirection(partner));
-    p.by_current(beam, beam) = normal.dot(reference_from_current.rotation() * beamDirection(beam));
+    p.partner[beam] = partner;
+    p.by_reference(beam) = -normal.dot(beamDirection(partner));
+    p.by_current(beam) = normal.dot(reference_from_current.rotation() * beamDirection(beam));
   }
   return p;
 }
@@ -89,8 +90,11 @@ Displacement RoomSimulation::match(const SimulatedScan& reference, const Simulat
 
   Displacement z;
   z.observable = V_o.transpose();
-  z.J_reference = -solve * p.by_reference;
-  z.J_current = -solve * p.by_current;
+  z.J_reference = Eigen::MatrixXd::Zero(d, kBeams);
+  for (int beam = 0; beam < kBeams; ++beam) {
+    if (p.partner[beam] >= 0) z.J_reference.col(p.partner[beam]) -= p.by_reference(beam) * solve.col(beam);
+  }
+  z.J_current = -solve * p.by_current.asDiagonal();
   z.variance_reference = reference.variance;
   z.variance_current = current.variance;
   z.matching_noise = kMatchingStd * kMatchingStd * Eigen::MatrixXd::Identity(d, d);

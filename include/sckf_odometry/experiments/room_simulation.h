@@ -45,10 +45,11 @@ class RoomSimulation {
   Displacement match(const SimulatedScan& reference, const SimulatedScan& current, RandomDraws& random) const;
 
  private:
-  struct Problem {
-    Eigen::MatrixXd A;             // ∂e/∂displacement, pairs × 3
-    Eigen::MatrixXd by_reference;  // ∂e/∂z_k, pairs × beams
-    Eigen::MatrixXd by_current;    // ∂e/∂z_{k+m}, pairs × beams
+  struct Problem {                 // a row for each beam of the current scan, of zeros if it has no partner
+    Eigen::MatrixXd A;             // ∂e/∂displacement, beams × 3
+    std::vector<int> partner;      // the beam of the reference, −1: none
+    Eigen::VectorXd by_reference;  // ∂e/∂z_k of the partner; by all other ranges it is zero
+    Eigen::VectorXd by_current;    // ∂e/∂z_{k+m} of the beam itself
   };
   Problem problem(const SimulatedScan& reference, const SimulatedScan& current) const;
 
