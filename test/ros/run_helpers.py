@@ -6,6 +6,7 @@ import os
 import subprocess
 import threading
 import time
+import xmlrpc.client
 
 import numpy as np
 import rosgraph
@@ -45,6 +46,27 @@ def subscribers(topic):
     """How many nodes subscribe to a topic, whether anybody publishes it or not."""
     state = rosgraph.Master(rospy.get_name()).getSystemState()[1]
     return sum(len(nodes) for name, nodes in state if name == rospy.resolve_name(topic))
+
+
+def process_of(node):
+    """Its number, by the node itself: the master knows nodes that have crashed, too."""
+    uri = rosgraph.Master(rospy.get_name()).lookupNode(node)
+    return xmlrpc.client.ServerProxy(uri).getPid(rospy.get_name())[2]
+
+
+def wait_for_process_of(node):
+    """Its number, as soon as it is there."""
+    found = []
+
+    def is_there():
+        try:
+            found.append(process_of(node))
+        except (rosgraph.MasterException, OSError):
+            return False
+        return True
+
+    wait_until(is_there, node)
+    return found[0]
 
 
 def wait_for_subscriber(topic):

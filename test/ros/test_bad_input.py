@@ -6,10 +6,8 @@ import copy
 import math
 import subprocess
 import unittest
-import xmlrpc.client
 
 import numpy as np
-import rosgraph
 import roslib.packages
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -122,17 +120,11 @@ def with_bad_messages(messages):
     return out, kinds, stamps
 
 
-def manager_pid():
-    node = rosgraph.Master(rospy.get_name()).lookupNode(MANAGER)
-    return xmlrpc.client.ServerProxy(node).getPid(rospy.get_name())[2]
-
-
 class BadInput(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        helpers.wait_until(lambda: rosgraph.Master(rospy.get_name()).lookupNode(MANAGER), 'the manager')
-        cls.pid = manager_pid()
+        cls.pid = helpers.wait_for_process_of(MANAGER)
         cls.recorder = helpers.Recorder()
         cls.loaders = [helpers.load_nodelet(MANAGER, '/refused', gate_probability=2.0, kf_dist_linear='far',
                                             publish_tf=1, odom_frame='', references_kept=16.0, scan_topics=[1, 'b'])]
@@ -162,7 +154,7 @@ class BadInput(unittest.TestCase):
             loader.terminate()
 
     def test_the_manager_lives(self):
-        self.assertEqual(manager_pid(), self.pid)
+        self.assertEqual(helpers.process_of(MANAGER), self.pid)
 
     def test_every_bad_parameter_is_named_with_what_is_allowed(self):
         text = self.recorder.log('not started')[0]

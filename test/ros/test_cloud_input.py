@@ -4,7 +4,6 @@ manager lives."""
 
 import unittest
 
-import rosgraph
 import rospy
 from sensor_msgs.msg import PointField
 
@@ -45,6 +44,7 @@ class CloudInput(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         rospy.set_param('/use_sim_time', False)
+        cls.pid = helpers.wait_for_process_of('/manager')
         cls.recorders = {node: helpers.Recorder(node + '/', node + '/sckf_odometry') for node in NODES}
         good = simulated_bag.messages(duration=25.0, mount=MOUNT, clouds=True)
         cls.clouds = [message.header.stamp.to_sec() for topic, message, _ in good if topic == '/cloud_in']
@@ -105,8 +105,7 @@ class CloudInput(unittest.TestCase):
                            'word of the mount that is missing')
 
     def test_the_manager_lives(self):
-        self.assertTrue(rosgraph.Master(rospy.get_name()).lookupNode('/manager'))
-        self.assertTrue(rospy.get_published_topics('/cloud'))
+        self.assertEqual(helpers.process_of('/manager'), self.pid)
 
 
 if __name__ == '__main__':

@@ -1,11 +1,11 @@
 #include <gtest/gtest.h>
 
-#include <cstdio>
 #include <fstream>
 #include <stdexcept>
 #include <variant>
 
 #include "sckf_odometry/ros/parameters.h"
+#include "temporary_folder.h"
 #include "text_matchers.h"
 
 namespace sckf {
@@ -16,14 +16,11 @@ constexpr char kConfigFile[] = "config/sckf_odometry.yaml";  // from the root of
 /// A parameter file that lives as long as the test.
 class TemporaryFile {
  public:
-  explicit TemporaryFile(const std::string& content) : path_(testing::TempDir() + "sckf_parameters.yaml") {
-    std::ofstream(path_) << content;
-  }
-  ~TemporaryFile() { std::remove(path_.c_str()); }
-  const std::string& path() const { return path_; }
+  explicit TemporaryFile(const std::string& content) { std::ofstream(path()) << content; }
+  std::string path() const { return folder_.file("parameters.yaml"); }
 
  private:
-  std::string path_;
+  TemporaryFolder folder_;
 };
 
 Options read(const std::string& yaml, std::vector<std::string>* warnings = nullptr) {

@@ -21,6 +21,7 @@ from sckf_odometry.srv import SetPose
 MANAGER = '/manager'
 NODE = '/sckf_odometry'
 SPEED = 20.0
+IN_THE_PAUSE = int(3 * simulated_bag.ODOMETRY_RATE)  # messages of odometry
 GIVEN = np.array([10.0, -5.0, 1.0])  # a pose that is set
 STD = np.array([0.5, 0.4, 0.1])
 
@@ -128,6 +129,8 @@ class Services(unittest.TestCase):
         cls.while_paused = cls.drive(3.0)
         cls.statuses_while_paused = len(cls.recorder.messages('status')) - cls.statuses_before_pause
         helpers.wait_until(lambda: cls.recorder.diagnostics().get('paused') == 'True', 'diagnostics that say so')
+        helpers.wait_until(lambda: int(cls.recorder.diagnostics().get('odometry: paused', 0)) >= IN_THE_PAUSE and
+                           int(cls.recorder.diagnostics().get('scans: paused', 0)) >= 12, 'diagnostics that count all')
         cls.counts_while_paused = cls.recorder.diagnostics()
         cls.paused = False
         cls.resumed_answer = cls.service['resume'](True)
@@ -196,7 +199,7 @@ class Services(unittest.TestCase):
         self.assertEqual((self.resumed_answer.success, self.resumed_answer.message), (True, 'running'))
         self.assertEqual(self.while_paused, [])
         self.assertEqual(self.statuses_while_paused, 0)
-        self.assertEqual(int(self.counts_while_paused['odometry: paused']), 3 * simulated_bag.ODOMETRY_RATE)
+        self.assertEqual(int(self.counts_while_paused['odometry: paused']), IN_THE_PAUSE)
         self.assertGreaterEqual(int(self.counts_while_paused['scans: paused']), 12)
 
     def test_what_happened_in_a_pause_does_not_count(self):

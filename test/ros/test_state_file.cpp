@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "sckf_odometry/ros/state_file.h"
+#include "temporary_folder.h"
 #include "text_matchers.h"
 
 namespace sckf {
@@ -21,8 +22,6 @@ SavedPose somePose() {
 
 class StateFileTest : public testing::Test {
  protected:
-  void TearDown() override { std::remove(path_.c_str()); }
-
   void fill(const std::string& content) { std::ofstream(path_) << content; }
 
   std::string content() const {
@@ -43,7 +42,8 @@ class StateFileTest : public testing::Test {
     return options;
   }
 
-  std::string path_ = testing::TempDir() + "sckf_state.yaml";
+  TemporaryFolder folder_;
+  std::string path_ = folder_.file("state.yaml");
   StateFile file_{path_};
 };
 
