@@ -125,8 +125,8 @@ class AllExperiments(unittest.TestCase):
 
     def test_deskewing_takes_away_what_the_turning_adds(self) -> None:
         n = self.numbers("extensions")
-        self.assertGreater(n["deskewing_without_yaw"], 3.0 * n["deskewing_with_yaw"])
-        self.assertGreater(n["deskewing_without_position"], 1.5 * n["deskewing_with_position"])
+        self.assertGreater(n["deskewing_without_yaw"], 50.0 * n["deskewing_with_yaw"])
+        self.assertGreater(n["deskewing_without_position"], 10.0 * n["deskewing_with_position"])
         self.assertLess(n["deskewing_with_yaw"], 2.0 * n["deskewing_with_yaw_slow"], "as if it had not turned")
 
     def test_clouds_are_as_good_as_a_laser_within_the_band_of_heights(self) -> None:
@@ -205,7 +205,7 @@ class AllExperiments(unittest.TestCase):
         self.assertLess(n["with_position"], 0.75 * n["without_position"])
 
     def test_more_references_drift_less_as_far_as_they_are_used(self) -> None:
-        keys = ("drift_percent", "drift_deg_per_m", "older", "time_ratio")
+        keys = ("drift_percent", "drift_deg_per_m", "older")
         numbers = self.section("references")
         n = {poses: {key: numbers[f"{poses}_{key}"] for key in keys} for poses in (2, 3, 4, 5, 8)}
         for figure in ("drift_percent", "drift_deg_per_m"):
@@ -215,8 +215,6 @@ class AllExperiments(unittest.TestCase):
         for poses in (3, 4, 5, 8):
             self.assertLessEqual(n[poses]["older"], poses - 2)
         self.assertGreater(n[8]["older"], n[3]["older"] + 0.5)
-        for poses, each in n.items():  # times of programs one after the other: no bound holds on a busy machine
-            self.assertGreater(each["time_ratio"], 0.0, poses)
 
     def test_an_update_is_linear_in_the_ranges_and_quadratic_in_the_states(self) -> None:
         n = self.section("update_cost")  # timings: the bounds tell the three apart, and no more
@@ -226,6 +224,8 @@ class AllExperiments(unittest.TestCase):
 
     def test_with_landmarks_beside_displacements_the_second_pass_falls_on_the_first(self) -> None:
         n = self.numbers("extensions")
+        self.assertLess(n["landmarks_none_end"], 0.1, n)
+        self.assertLess(n["landmarks_only_end"], 1.2, n)
         self.assertLess(n["landmarks_lines_end"], 0.1, n)
         self.assertLess(n["landmarks_corners_end"], 0.095, n)
         self.assertLess(n["landmarks_corners_and_lines_end"], 0.08, n)
