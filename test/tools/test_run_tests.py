@@ -165,6 +165,8 @@ class RunTestsTest(unittest.TestCase):
         tests = json.loads(listing.stdout)["tests"]
         labelled = {test["name"] for test in tests for each in test["properties"] if each["name"] == "LABELS"}
         self.assertGreater(len(labelled), 10)
+        limited = {test["name"] for test in tests for each in test["properties"] if each["name"] == "TIMEOUT"}
+        self.assertEqual({name for name in labelled - limited if "rostest" not in name}, set(), "may run for ever")
         self.assertEqual({test["name"] for test in tests} - labelled, set())
 
 
