@@ -132,6 +132,11 @@ class BagTest(ScriptCase):
         front = self.params("scan_topics: [front/scan]\n")
         self.assertEqual(self.told("front.bag", "--params", front, "--odom-topic", "wheels"), self.told("drive.bag"))
 
+    def test_what_else_the_robot_has_is_left_out(self) -> None:
+        others = self.params("use_imu: true\nuse_imu_orientation: true\nuse_pose_updates: true\nstandstill_time: 0.5\n"
+                             "landmarks: lines\nlandmarks_only: true\n")
+        self.assertEqual(self.told("drive.bag", "--params", others), self.told("drive.bag"))
+
     def test_of_two_lasers_the_first_or_the_one_that_is_named(self) -> None:
         halved(self.path("drive.bag"), self.path("halves.bag"))
         both = ("--params", self.params("scan_topics: [right/scan, left/scan]\n"))
