@@ -42,9 +42,12 @@ MultiCloneFilter::MultiCloneFilter(const SE2& odom_from_base, const Matrix3d& co
       pose_(0.0, 0.0, odom_from_base.yaw),
       calibrated_(columnsOf(states.calibration_std)) {
   pose_error_ = errors_.add(covariance);
-  if (calibrated_.cols() > 0) calibration_error_ = errors_.add(calibrationCovarianceAtFirst());
+  if (calibrated_.cols() > 0) beginCalibration(states.known_calibration);
   if (states.gyro_bias_std > 0.0) {
-    gyro_bias_error_ = errors_.add(MatrixXd::Constant(1, 1, states.gyro_bias_std * states.gyro_bias_std));
+    const double variance = states.gyro_bias_std * states.gyro_bias_std;
+    const GyroBias bias = states.known_gyro_bias.value_or(GyroBias{0.0, variance});
+    gyro_bias_ = bias.value;
+    gyro_bias_error_ = errors_.add(MatrixXd::Constant(1, 1, bias.variance));
   }
   clone(Eigen::VectorXd(0));  // (6)(7)
 }

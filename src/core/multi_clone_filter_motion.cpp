@@ -38,6 +38,15 @@ Eigen::MatrixXd MultiCloneFilter::calibrationCovarianceAtFirst() const {
   return (calibrated_.transpose() * options_.calibration_std).cwiseAbs2().asDiagonal();
 }
 
+void MultiCloneFilter::beginCalibration(const std::optional<WheelCalibration>& known) {
+  if (!known) {
+    calibration_error_ = errors_.add(calibrationCovarianceAtFirst());
+    return;
+  }
+  calibration_ = calibrated_ * calibrated_.transpose() * known->error;
+  calibration_error_ = errors_.add(calibrated_.transpose() * known->covariance * calibrated_);
+}
+
 /// By those that are estimated.
 Eigen::Matrix3Xd MultiCloneFilter::byCalibration(const SE2& u) const { return byWheelCalibration(u) * calibrated_; }
 

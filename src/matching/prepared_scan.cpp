@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <optional>
 #include <sstream>
 
 namespace sckf {
@@ -70,15 +72,37 @@ std::string geometryProblem(const LaserScan& scan, const Eigen::Isometry3d& base
   return problem.str();
 }
 
-/// Every k-th beam, so that no more are left than allowed: time and memory are proportional to them.
-LaserScan thinned(const LaserScan& scan, std::size_t max_beams) {
-  const std::size_t k = (scan.ranges.size() + max_beams - 1) / max_beams;
+/// Every k-th beam from one on.
+LaserScan everyBeam(std::size_t k, std::size_t first, const LaserScan& scan) {
   LaserScan thin = scan;
+  thin.angle_min += static_cast<double>(first) * scan.angle_increment;
   thin.angle_increment *= static_cast<double>(k);
   thin.time_increment *= static_cast<double>(k);
   thin.ranges.clear();
-  for (std::size_t i = 0; i < scan.ranges.size(); i += k) thin.ranges.push_back(scan.ranges[i]);
+  for (std::size_t i = first; i < scan.ranges.size(); i += k) thin.ranges.push_back(scan.ranges[i]);
   return thin;
+}
+
+/// So that no more are left than allowed: time and memory are proportional to them.
+LaserScan thinned(const LaserScan& scan, std::size_t max_beams) {
+  return everyBeam((scan.ranges.size() + max_beams - 1) / max_beams, 0, scan);
+}
+
+/// Drivers that fill a finer grid than their laser has leave all but every k-th beam empty. Those that are no beams
+/// would hide that the others are neighbours: the scan without them, if there are such.
+std::optional<LaserScan> withoutEmptyBeams(const LaserScan& scan) {
+  constexpr std::size_t kFewest = 20;  // by chance as few may lie in such a pattern
+  std::size_t first = scan.ranges.size();
+  std::size_t k = 0;
+  std::size_t read = 0;
+  for (std::size_t i = 0; i < scan.ranges.size() && k != 1; ++i) {
+    if (!std::isfinite(scan.ranges[i]) || scan.ranges[i] <= 0.0F) continue;
+    first = std::min(first, i);
+    k = std::gcd(k, i - first);
+    ++read;
+  }
+  if (k <= 1 || read < kFewest || 2 * read * k < scan.ranges.size()) return std::nullopt;
+  return everyBeam(k, first % k, scan);
 }
 
 /// What beam i measured, from where the robot was then to where it was at the stamp: p ← C(φ_i) p + t_i, and the rays
@@ -145,6 +169,9 @@ std::shared_ptr<const PreparedScan> prepareScan(const LaserScan& scan, const Eig
   const std::string problem = geometryProblem(scan, base_from_laser);
   if (!problem.empty()) return reject(problem);
   const auto max_beams = static_cast<std::size_t>(std::max(1, options.max_beams));
+  if (const std::optional<LaserScan> dense = withoutEmptyBeams(scan)) {
+    return prepareScan(*dense, base_from_laser, options, rejection, motion);
+  }
   if (scan.ranges.size() > max_beams) {
     return prepareScan(thinned(scan, max_beams), base_from_laser, options, rejection, motion);
   }

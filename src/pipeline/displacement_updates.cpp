@@ -68,7 +68,6 @@ void DisplacementUpdates::update(ScanReport& report, FusionMethod& filter) {
   report.prediction = filter.predictedDisplacementFrom(clone);  // (16)
   if (isOutOfReach(report.prediction, options_.reference)) {
     report.outcome = ScanOutcome::kReference;
-    report.reason = "the last reference is too far away";
     report.new_reference = laser.policy.replaces(report.prediction.reference_from_current, 0.0, false);
     return;
   }

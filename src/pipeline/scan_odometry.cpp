@@ -47,7 +47,8 @@ LaserConstants constantsOf(const PipelineOptions& options) {
 
 }  // namespace
 
-ScanOdometry::ScanOdometry(const PipelineOptions& options, const SE2& odom_from_base, const Eigen::Matrix3d& covariance)
+ScanOdometry::ScanOdometry(const PipelineOptions& options, const SE2& odom_from_base, const Eigen::Matrix3d& covariance,
+                           const Found& before)
     : options_(options),
       lasers_(options.lasers, {constantsOf(options), {}, std::nullopt}),
       odometry_(options.motion, options.odometry_timeout),
@@ -55,11 +56,15 @@ ScanOdometry::ScanOdometry(const PipelineOptions& options, const SE2& odom_from_
       twist_(options.twist_window),
       start_(odom_from_base),
       start_covariance_(covariance),
+      before_(before),
       filter_twist_(options.twist_window),
       displacements_(options, options.lasers),
       landmarks_(options.landmarks) {
   check(options);
   checkPose(odom_from_base, covariance);
+  for (std::size_t i = 0; i < std::min(lasers_.size(), before.lasers.size()); ++i) {
+    lasers_[i].constants = before.lasers[i];
+  }
 }
 
 OdometryBuffer::Insertion ScanOdometry::addOdometry(const OdometrySample& sample) {
@@ -246,7 +251,10 @@ void ScanOdometry::setOptions(const PipelineOptions& options) {
 }
 
 void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp) {
-  const StateOptions states = statesFor(options_.calibration, options_.imu);
+  StateOptions states = statesFor(options_.calibration, options_.imu);
+  before_ = found();
+  states.known_calibration = before_.calibration;
+  states.known_gyro_bias = before_.gyro_bias;
   const Eigen::Matrix3d P = withYawUpToATurn(symmetric(covariance));
   map_ = nullptr;
   if (options_.pose_updates.on) {
@@ -265,13 +273,20 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
   standstill_.interrupt();
   imu_.forgetTaken();
   displacements_ = DisplacementUpdates(options_, options_.lasers);
-  for (Laser& laser : lasers_) {
-    laser.constants = constantsOf(options_);
-    laser.taken.reset();
-  }
+  for (Laser& laser : lasers_) laser.taken.reset();
   landmarks_ = Landmarks(options_.landmarks);
   carried_on_.reset();
   carryOn();
+}
+
+Found ScanOdometry::found() const {
+  Found found = before_;
+  if (filter_ && filter_->calibration().covariance != Eigen::Matrix4d::Zero())
+    found.calibration = filter_->calibration();
+  if (filter_ && filter_->gyroBias().variance > 0.0) found.gyro_bias = filter_->gyroBias();
+  found.lasers.clear();
+  for (const Laser& laser : lasers_) found.lasers.push_back(laser.constants);
+  return found;
 }
 
 Estimate ScanOdometry::estimate() const {

@@ -309,11 +309,12 @@ void ScKfOdometryNode::warnOfSkew(const ScanReport& report) {
   if (report.deskewing == Deskewing::kRefused) warnings_.warn("scan " + toString(report.deskewing), text);
 }
 
-void ScKfOdometryNode::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, const std::string& reason) {
+void ScKfOdometryNode::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, const std::string& reason,
+                             const Found& before) {
   health_.pipelineDropped(reason, pipeline_->odometryJumps());
   health_.scans.ended(reason, scans_without_mount_.size());
   scans_without_mount_.clear();
-  pipeline_ = std::make_unique<ScanOdometry>(options_.pipeline, odom_from_base, covariance);
+  pipeline_ = std::make_unique<ScanOdometry>(options_.pipeline, odom_from_base, covariance, before);
 }
 
 void ScKfOdometryNode::followTime(Stamp jump) {
@@ -359,7 +360,9 @@ void ScKfOdometryNode::pause(bool paused) {
   paused_ = paused;
   keepPose();
   // It goes on from where it is, whatever the wheels say then.
-  if (const auto latest = pipeline_->latest()) begin(latest->odom_from_base, latest->covariance, "paused");
+  if (const auto latest = pipeline_->latest()) {
+    begin(latest->odom_from_base, latest->covariance, "paused", pipeline_->found());
+  }
 }
 
 void ScKfOdometryNode::keepPose() {

@@ -179,8 +179,23 @@ TEST(OtherMeasurements, OneErrorOfTheWheelsAloneIsEstimatedWhereTheOthersHaveNoS
   }
 }
 
-/// One wheel is larger than the other: what that turns the robot by on its way ahead it turns it back by when it reverses,
-/// where there is nothing to see.
+TEST(OtherMeasurements, BeginWithWhatIsKnownOfThem) {
+  StateOptions states = everySensor().states;
+  states.calibration_std << 0.02, 0.0, 0.05, 0.1;  // of rotations there is no error
+  WheelCalibration known;
+  known.error << 0.01, 0.3, -0.02, 0.05;
+  known.covariance = Eigen::Vector4d(1e-4, 1e-4, 4e-4, 9e-4).asDiagonal();
+  states.known_calibration = known;
+  states.known_gyro_bias = GyroBias{0.004, 1e-6};
+  const MultiCloneFilter filter(SE2(), Eigen::Matrix3d::Zero(), states);
+  EXPECT_TRUE(matricesNear(filter.calibration().error, Eigen::Vector4d(0.01, 0.0, -0.02, 0.05), 1e-15));
+  EXPECT_TRUE(matricesNear(filter.calibration().covariance.diagonal(), Eigen::Vector4d(1e-4, 0.0, 4e-4, 9e-4), 1e-15));
+  EXPECT_EQ(filter.gyroBias().value, 0.004);
+  EXPECT_NEAR(filter.gyroBias().variance, 1e-6, 1e-18);
+}
+
+/// One wheel is larger than the other: what that turns the robot by on its way ahead it turns it back by when it
+/// reverses, where there is nothing to see.
 TEST(OtherMeasurements, WhatWheelsTurnTheRobotByAheadTheyTurnItBackInReverse) {
   constexpr double kTurn = 0.05;  // [rad/m]
   StateOptions states;

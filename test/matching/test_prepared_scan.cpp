@@ -1,7 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <random>
 
 #include "matching/simulated_world.h"
 #include "sckf_odometry/matching/prepared_scan.h"
@@ -55,6 +57,32 @@ TEST(PreparedScan, LeavesOutWhatIsNoReading) {
   ASSERT_EQ(prepared->size(), 84U);
   EXPECT_EQ(prepared->points.beam[2], 2);
   EXPECT_EQ(prepared->points.beam[3], 10);
+}
+
+/// As of a driver that fills a finer grid than its laser has.
+TEST(PreparedScan, EmptyBeamsBetweenThoseOfTheLaserAreNoBeams) {
+  std::mt19937_64 random(3);
+  SimulatedLaser laser;
+  laser.noise = 0.01;
+  const LaserScan all = simulateScan(room(), SE2(), laser, &random);
+  for (const std::size_t every : {2U, 3U}) {
+    for (const float empty : {0.0F, std::numeric_limits<float>::infinity()}) {
+      SCOPED_TRACE(testing::Message() << "1 of " << every << ", others " << empty);
+      LaserScan scan = all;
+      for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
+        if (i % every != 1) scan.ranges[i] = empty;
+      }
+      const auto prepared = prepareScan(scan, kAtBase, ScanOptions());
+      ASSERT_NE(prepared, nullptr);
+      EXPECT_EQ(prepared->beams, (scan.ranges.size() + every - 2) / every);
+      EXPECT_NEAR(prepared->angle_increment, static_cast<double>(every) * scan.angle_increment, 1e-12);
+      EXPECT_NEAR(prepared->range_noise, 0.01, 0.005);
+      EXPECT_TRUE(prepared->free_space.contains(0.5 * prepared->points.point[30]));
+      const double bearing = scan.angle_min + (1.0 + 30.0 * static_cast<double>(every)) * scan.angle_increment;
+      const Eigen::Vector2d& point = prepared->points.point[30];
+      EXPECT_NEAR(std::remainder(std::atan2(point.y(), point.x()) - bearing, 2.0 * M_PI), 0.0, 1e-9);
+    }
+  }
 }
 
 TEST(PreparedScan, ItsOwnLimitsOfRangeHoldBesideTheScans) {

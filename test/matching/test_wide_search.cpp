@@ -73,6 +73,33 @@ TEST(WideSearch, FindsATurnThatTheWheelsDidNotTell) {
       << "found without it";
 }
 
+/// No wall is nearer than 25 m.
+TEST(WideSearch, FindsTurnsInAHallToo) {
+  const World hall =
+      closedPolygon({{-45, -33}, {45, -33}, {45, 15}, {36, 15}, {36, 33}, {-15, 33}, {-15, 36}, {-45, 36}});
+  SimulatedLaser laser;
+  laser.beams = 1081;
+  laser.angle_min = -0.75 * M_PI;
+  laser.angle_increment = 1.5 * M_PI / 1080.0;
+  laser.range_max = 80.0;
+  laser.noise = 0.01;
+  std::mt19937_64 random(7);
+  const auto seenFrom = [&](const SE2& pose) {
+    return prepareScan(simulateScan(hall, pose, laser, &random), laser.base_from_laser, ScanOptions());
+  };
+  int found = 0;
+  for (int k = 0; k < 12; ++k) {
+    const SE2 from(0.2 * k - 1.0, 0.5, 0.5 * k);
+    const SE2 truth(0.4, 0.05, k % 2 == 0 ? 1.2 : -1.2);
+    const Match match = ScanMatcher(MatcherOptions()).match(*seenFrom(from), *seenFrom(compose(from, truth)), frozen());
+    if (!match.displacement) continue;
+    const Eigen::Vector3d e = error(match.displacement->reference_from_current, truth);
+    EXPECT_LT(e.norm(), 0.1) << k << ": " << e.transpose();
+    ++found;
+  }
+  EXPECT_GT(found, 9) << "of 12";
+}
+
 /// Two corridors that cross, and rooms off them.
 World crossing() {
   World world;

@@ -94,11 +94,14 @@ TEST(ScanOdometryState, AfterSettingThePoseNothingIsLeftOfBefore) {
   for (const std::string& method : fusionMethodNames()) {
     SCOPED_TRACE(method);
     constexpr int kInstant = 4020;
-    Driven set(drive, withMethod(method));
+    PipelineOptions options = withMethod(method);
+    options.calibration = noCalibration();  // what is found of wheels and laser stays, see below
+    options.range_offset_std = options.sweep_duration_std = 0.0;
+    Driven set(drive, options);
     set.odometry(0);
     set.run(0, 4060);
     set.pipeline.setPose(kElsewhere, kCovariance, at(kInstant));
-    Driven fresh(drive, withMethod(method), kElsewhere, kCovariance);
+    Driven fresh(drive, options, kElsewhere, kCovariance);
     for (const int ms : {kInstant, 4040, 4060}) fresh.odometry(ms);
     EXPECT_EQ(set.pipeline.latest()->stamp, at(4060));
     expectNear(*set.pipeline.latest(), *fresh.pipeline.latest(), 1e-12);
@@ -110,6 +113,33 @@ TEST(ScanOdometryState, AfterSettingThePoseNothingIsLeftOfBefore) {
       EXPECT_EQ(set.reports[before + i].outcome, fresh.reports[i].outcome) << i;
       expectNear(*set.reports[before + i].estimate, *fresh.reports[i].estimate, 1e-9);
     }
+  }
+}
+
+/// It has nothing to do with where the robot is.
+TEST(ScanOdometryState, WhatWasFoundOfWheelsGyroAndLaserStays) {
+  SimulatedDrive drive;
+  drive.laser.noise = 0.01;
+  drive.laser.offset = 0.02;
+  PipelineOptions options;
+  options.range_offset_std = 0.05;
+  Driven set(drive, options);
+  set.odometry(0);
+  set.run(0, 10000);
+  const ScanReport before = set.reports.back();
+  ASSERT_GT(before.laser_constants.range_offset.variance(), 0.0);
+  ASSERT_LT(before.calibration.covariance(0, 0), 0.7 * std::pow(options.calibration.distance_std, 2));
+  Driven next(drive, options);  // as after a pause
+  next.pipeline = ScanOdometry(options, kElsewhere, kCovariance, set.pipeline.found());
+  set.pipeline.setPose(kElsewhere, kCovariance, at(10000));
+  next.odometry(10000);
+  for (Driven* driven : {&set, &next}) {
+    driven->run(10000, 10100);
+    const ScanReport& after = driven->reports.back();
+    EXPECT_TRUE(matricesNear(after.calibration.error, before.calibration.error, 1e-4));
+    EXPECT_TRUE(matricesClose(after.calibration.covariance.diagonal(), before.calibration.covariance.diagonal(), 0.01));
+    EXPECT_EQ(after.laser_constants.range_offset.value(), before.laser_constants.range_offset.value());
+    EXPECT_EQ(after.laser_constants.sweep_duration.value(), before.laser_constants.sweep_duration.value());
   }
 }
 

@@ -14,8 +14,8 @@ bool isCovariance(const Eigen::Matrix3d& P);
 /// Whether it is a covariance of which nothing is known exactly, so that it has an inverse.
 bool isPositiveDefinite(const Eigen::Matrix3d& P);
 
-/// The same, but for a yaw of which less is known than nothing: its std is a full turn then. What is far from the origin
-/// would err by so much otherwise that doubles do not hold a centimetre beside it.
+/// The same, but for a yaw of which less is known than nothing: its std is a full turn then. What is far from the
+/// origin would err by so much otherwise that doubles do not hold a centimetre beside it.
 Eigen::Matrix3d withYawUpToATurn(const Eigen::Matrix3d& covariance);
 
 /// What is wrong with a pose and its covariance as an estimate, what was expected; empty if nothing is.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,9 +36,9 @@ struct PoseMeasurement {
 };
 
 /// Systematic errors of the wheels, and of the laser's place: where the wheels tell (x, y, yaw), the true motion is
-/// (x (1 + s) − l (1 − cos yaw), y (1 + s) + l sin yaw, yaw (1 + r) + k x): one wheel is larger than the other, which turns
-/// the robot to the other side when it reverses; the laser is farther ahead, by l, of the point about which they turn
-/// than its mount says.
+/// (x (1 + s) − l (1 − cos yaw), y (1 + s) + l sin yaw, yaw (1 + r) + k x): one wheel is larger than the other, which
+/// turns the robot to the other side when it reverses; the laser is farther ahead, by l, of the point about which they
+/// turn than its mount says.
 struct WheelCalibration {
   using Jacobian = Eigen::Matrix<double, 3, 4>;          ///< of a motion x, y, yaw by s, r, k, l
   Eigen::Vector4d error = Eigen::Vector4d::Zero();       ///< s, r, k, l [1, 1, rad/m, m]
@@ -52,8 +53,9 @@ struct GyroBias {
 
 /// States beside the pose that are not cloned (III-F). Where a standard deviation is zero there is no such state.
 struct StateOptions {
-  /// Of s, r, k, l of WheelCalibration: how large they can be [1, 1, rad/m, m]. They are taken for stationary processes,
-  /// which forget what they were within calibration_way [m]: an error of the wheels that passes leaves nothing behind.
+  /// Of s, r, k, l of WheelCalibration: how large they can be [1, 1, rad/m, m]. They are taken for stationary
+  /// processes, which forget what they were within calibration_way [m]: an error of the wheels that passes leaves
+  /// nothing behind.
   Eigen::Vector4d calibration_std = Eigen::Vector4d::Zero();
   double calibration_way = 100.0;
 
@@ -61,6 +63,10 @@ struct StateOptions {
   double gyro_bias_drift = 0.0;  ///< [rad/s/√s] … and by how much it wanders
 
   double heading_drift = 0.0;  ///< [rad/√s] by how much a compass and the yaw in the world come apart
+
+  /// What is known of them at the start, where that is more than how large they can be.
+  std::optional<WheelCalibration> known_calibration = {};
+  std::optional<GyroBias> known_gyro_bias = {};
 };
 
 /// What a method expects the next displacement to be, before the scans are looked at.

@@ -80,6 +80,7 @@ class MultiCloneFilter : public LandmarkStates {
   double varianceOf(const std::optional<Part>& part) const;
 
   // The motion (multi_clone_filter_motion.cpp).
+  void beginCalibration(const std::optional<WheelCalibration>& known);
   Eigen::MatrixXd calibrationCovarianceAtFirst() const;
   OdometryIncrement calibrated(const OdometryIncrement& increment) const;
   Eigen::Matrix3Xd byCalibration(const SE2& motion) const;

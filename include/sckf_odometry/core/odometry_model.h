@@ -41,8 +41,8 @@ OdometryIncrement modelledIncrement(const SE2& before_from_after, const Odometry
 
 /// The increment with the covariance that the robot's driver states for its twist (3 × 3: vx, vy, yaw rate). It is made
 /// in dt [s], a part of the interval [s] in which the twist errs alike: Q = Σ dt interval, so that the parts of an
-/// interval add up to Σ interval², however it is cut. Σ must be symmetric, positive definite on the diagonal and finite;
-/// see sensibleTwistCovariance().
+/// interval add up to Σ interval², however it is cut. Σ must be symmetric, positive definite on the diagonal and
+/// finite; see sensibleTwistCovariance().
 OdometryIncrement statedIncrement(const SE2& before_from_after, const Eigen::Matrix3d& twist_covariance, double dt,
                                   double interval);
 

@@ -17,7 +17,8 @@ struct WideSearchOptions {
 /// The price of widelySearched() at which, where scans hardly tell, the wheels do.
 constexpr double kPriceOfDistance = 0.14;
 
-/// Of all displacements in steps of 10 cm and 2.3° about the predicted one, those at which most points of the current
+/// Of all displacements in steps of 10 cm and 2.3° about the predicted one (in a hall with most walls beyond 20 m of
+/// larger and finer ones), those at which most points of the current
 /// scan lie near points of the reference: up to three that are turned against each other, as a room with square corners
 /// looks alike, the best first. Good to about such a step, as the start of an alignment. price: of all points, so many
 /// must tell against the prediction for a place that is 1 m, or 1 rad, from it, so that where the scans hardly tell

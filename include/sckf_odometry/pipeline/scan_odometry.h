@@ -24,12 +24,20 @@
 
 namespace sckf {
 
+/// What an estimate has found of wheels, gyro and lasers, wherever the robot is: for one that begins after it.
+struct Found {
+  std::optional<WheelCalibration> calibration;
+  std::optional<GyroBias> gyro_bias;
+  std::vector<LaserConstants> lasers;  ///< one for each; or none
+};
+
 class ScanOdometry {
  public:
   /// The estimate starts at a pose, with a covariance: symmetric, positive semi-definite. Throws std::invalid_argument
-  /// with name, value and what is expected as check(options) does, and if pose or covariance are none.
+  /// with name, value and what is expected as check(options) does, and if pose or covariance are none. before: what an
+  /// estimate with the same options has found().
   explicit ScanOdometry(const PipelineOptions& options, const SE2& odom_from_base = SE2(),
-                        const Eigen::Matrix3d& covariance = Eigen::Matrix3d::Zero());
+                        const Eigen::Matrix3d& covariance = Eigen::Matrix3d::Zero(), const Found& before = {});
 
   /// Samples may come in any order as long as they are newer than the last scan taken. A step of the wheels that they
   /// cannot have made (see OdometryBuffer) is no motion: the estimate goes on at its velocity, less certain by
@@ -62,12 +70,15 @@ class ScanOdometry {
   std::optional<Estimate> latest() const;
 
   /// The robot was there, whatever has been estimated; at the newest odometry, if none is at hand for the stamp.
-  /// Nothing is kept of what relates the estimate to its past: the next scan becomes the reference. Before the first
-  /// odometry: where the estimate starts. Throws as the constructor does.
+  /// Nothing is kept of what relates the estimate to its past: the next scan becomes the reference. What has been found
+  /// of wheels, gyro and lasers stays. Before the first odometry: where the estimate starts. Throws as the constructor
+  /// does.
   void setPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp);
 
   /// From the next scan on; the estimate and its references stay. Throws as checkChange() does.
   void setOptions(const PipelineOptions& options);
+
+  Found found() const;
 
   /// The wheels are silent: the scans carry on alone, or wait, as options.scans_alone says.
   bool onScansAlone() const;
@@ -141,6 +152,7 @@ class ScanOdometry {
 
   SE2 start_;  // odom_from_base before there is a filter
   Eigen::Matrix3d start_covariance_;
+  Found before_;                          // … and what is known by then
   std::unique_ptr<FusionMethod> filter_;  // at filter_stamp_; null before the first odometry
   MapFilter* map_ = nullptr;              // filter_, where absolute poses are used
   Stamp filter_stamp_{0};

@@ -79,7 +79,8 @@ class ScKfOdometryNode {
   void accountPoses(bool scans_were_taken);
 
   /// A new estimate begins at a pose; what waits is dropped, for a reason in words.
-  void begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, const std::string& reason);
+  void begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, const std::string& reason,
+             const Found& before = {});
   void followTime(Stamp jump);
   void reset();
   std::string setPose(const geometry_msgs::PoseWithCovarianceStamped& message);  ///< returns what is wrong with it
