@@ -238,14 +238,14 @@ TEST(Parameters, WhatIsNotGivenStaysAsItWas) {
 
 TEST(Parameters, AFileThatCannotBeReadIsNamed) {
   EXPECT_THROW(ParameterFile("/nowhere/parameters.yaml"), std::invalid_argument);
-  EXPECT_TRUE(contains(refusal("- a\n- list\n"), "sckf_parameters.yaml"));
+  EXPECT_TRUE(contains(refusal("- a\n- list\n"), "parameters.yaml: yaml-cpp"));
   try {
     ParameterFile(testing::TempDir());
     ADD_FAILURE() << "a folder is no file";
   } catch (const std::invalid_argument& exception) {
     EXPECT_TRUE(contains(exception.what(), "parameter file " + testing::TempDir() + ": "));
   }
-  EXPECT_TRUE(contains(refusal("odom_frame: [unclosed\n"), "sckf_parameters.yaml"));
+  EXPECT_TRUE(contains(refusal("odom_frame: [unclosed\n"), "parameters.yaml: yaml-cpp"));
 }
 
 }  // namespace
