@@ -63,14 +63,8 @@ void DisplacementUpdates::setOptions(const DisplacementOptions& options) {
 void DisplacementUpdates::update(ScanReport& report, FusionMethod& filter) {
   const std::size_t clone = *references_.newestOf(report.laser);
   const PreparedScan& reference = references_[clone];
-  Laser& laser = lasers_[report.laser];
   report.reference_stamp = reference.stamp;
   report.prediction = filter.predictedDisplacementFrom(clone);  // (16)
-  if (isOutOfReach(report.prediction, options_.reference)) {
-    report.outcome = ScanOutcome::kReference;
-    report.new_reference = laser.policy.replaces(report.prediction.reference_from_current, 0.0, false);
-    return;
-  }
   const Stopwatch stopwatch;
   report.match = matcher_.match(reference, *report.scan, report.prediction);  // (1)
   report.match_time = stopwatch.seconds();
@@ -82,6 +76,7 @@ void DisplacementUpdates::update(ScanReport& report, FusionMethod& filter) {
     report.outcome = ScanOutcome::kNoMatch;
     report.reason = toString(report.match.failure);
   }
+  Laser& laser = lasers_[report.laser];
   if (used) {
     laser.place(report.stamp);
   } else {

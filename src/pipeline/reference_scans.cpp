@@ -13,23 +13,6 @@ bool isVague(const DisplacementPrediction& prediction) {
   return P(0, 0) + P(1, 1) > kFar * kFar || P(2, 2) > kTurned * kTurned;
 }
 
-namespace {
-
-/// As a share of how far away references are compared with.
-double distanceOf(const DisplacementPrediction& prediction, const ReferenceOptions& options) {
-  constexpr double kFartherIfVague = 2.0;  // those from before the pose became so uncertain may be out of reach by now
-  const SE2& displacement = prediction.reference_from_current;
-  const double reach = isVague(prediction) ? kFartherIfVague : 1.0;
-  return std::hypot(displacement.translation().norm() / (reach * options.older_dist_linear),
-                    displacement.yaw / (reach * options.older_dist_angular));
-}
-
-}  // namespace
-
-bool isOutOfReach(const DisplacementPrediction& prediction, const ReferenceOptions& options) {
-  return distanceOf(prediction, options) >= 1.0;
-}
-
 std::vector<std::size_t> ReferenceScans::clonesOf(std::size_t laser) const {
   std::vector<std::size_t> clones;
   for (std::size_t clone = 0; clone < references_.size(); ++clone) {
@@ -59,10 +42,15 @@ void ReferenceScans::forget(std::size_t clone, FusionMethod& filter) {
 
 std::vector<std::size_t> ReferenceScans::worthComparing(std::size_t laser, const FusionMethod& filter,
                                                         const ReferenceOptions& options) const {
+  constexpr double kFartherIfVague = 2.0;  // those from before the pose became so uncertain may be out of reach by now
   const std::vector<std::size_t> own = clonesOf(laser);
   std::vector<std::pair<double, std::size_t>> near;  // distance as a share of what is allowed
   for (std::size_t i = 1; i < own.size(); ++i) {
-    const double distance = distanceOf(filter.predictedDisplacementFrom(own[i]), options);
+    const DisplacementPrediction prediction = filter.predictedDisplacementFrom(own[i]);
+    const SE2& displacement = prediction.reference_from_current;
+    const double reach = isVague(prediction) ? kFartherIfVague : 1.0;
+    const double distance = std::hypot(displacement.translation().norm() / (reach * options.older_dist_linear),
+                                       displacement.yaw / (reach * options.older_dist_angular));
     if (distance < 1.0) near.emplace_back(i == 1 ? 0.0 : distance, own[i]);
   }
   std::sort(near.begin(), near.end());

@@ -57,15 +57,6 @@ TEST(ReferenceScans, WhatIsFarOrTurnedIsNotCompared) {
   EXPECT_THAT(way.scans.worthComparing(0, filter, limits(9)), IsEmpty()) << "turned by more than 1.5 rad";
 }
 
-TEST(ReferenceScans, WhatIsAsFarAsOlderOnesAreNotComparedIsOutOfReach) {
-  const Eigen::Matrix3d vague = 0.1 * Eigen::Matrix3d::Identity();
-  EXPECT_FALSE(isOutOfReach({SE2(2.9, 0.0, 0.1), kSmall}, limits(3)));
-  EXPECT_TRUE(isOutOfReach({SE2(0.0, -3.1, 0.1), kSmall}, limits(3)));
-  EXPECT_TRUE(isOutOfReach({SE2(0.1, 0.0, -1.6), kSmall}, limits(3)));
-  EXPECT_FALSE(isOutOfReach({SE2(5.9, 0.0, 0.1), vague}, limits(3))) << "it may be nearer";
-  EXPECT_TRUE(isOutOfReach({SE2(6.1, 0.0, 0.1), vague}, limits(3)));
-}
-
 TEST(ReferenceScans, WhatWasNearBeforeThePoseBecameUncertainIsComparedFromTwiceAsFar) {
   MultiCloneFilter filter(SE2(), kSmall);
   Way way(filter);

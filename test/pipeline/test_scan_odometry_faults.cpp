@@ -392,24 +392,6 @@ TEST(ScanOdometryFaults, WhatFallsOnAnotherWallPerfectlyIsNoSlipIfNothingTellsAg
   EXPECT_LT(std::abs(driven.latestError(2980).z()), 0.1) << driven.latestError(2980).transpose();
 }
 
-/// After a way on which the laser saw nothing its last reference is of no use: what a scan sees there may be anything.
-TEST(ScanOdometryFaults, AReferenceOutOfReachIsNotComparedWith) {
-  const auto ahead = [](double t) { return SE2(0.5 * t, 0.0, 0.0); };
-  World walls = closedPolygon({{-2, -2}, {2, -2}, {2, 2}, {-2, 2}});
-  for (const Wall& wall : closedPolygon({{8, -2}, {14, -2}, {14, 2}, {8, 2}})) walls.push_back(wall);
-  SimulatedDrive drive({}, 22000, walls, ahead);
-  Driven driven(drive, wheelsAsTheyAre());
-  driven.odometry(0);
-  for (int ms = 20; ms <= 22000; ms += 20) {
-    const bool blind = ms > 1500 && ms < 18500;
-    if (ms % 100 == 20) driven.scan(blind ? constantScan(drive, ms - 13, 100.0F) : drive.scan(ms - 13));
-    driven.odometry(ms);
-  }
-  EXPECT_EQ(driven.count(ScanOutcome::kReference), 2U);
-  EXPECT_EQ(driven.count(ScanOutcome::kNoMatch) + driven.count(ScanOutcome::kSlip), 0U);
-  EXPECT_GT(driven.count(ScanOutcome::kUpdated), 45U);
-}
-
 // ---- contradictions -------------------------------------------------------------------------------------------------
 
 /// The laser is 0.08 m to the left of where it is taken to be: a displacement that the wheels have not seen.

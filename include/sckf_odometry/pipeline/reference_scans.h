@@ -51,7 +51,4 @@ class ReferenceScans {
 /// refined.
 bool isVague(const DisplacementPrediction& prediction);
 
-/// Whether a scan is too far from a reference to be compared with it.
-bool isOutOfReach(const DisplacementPrediction& prediction, const ReferenceOptions& options);
-
 }  // namespace sckf

@@ -24,7 +24,7 @@ struct Estimate {
 
 /// What became of a scan.
 enum class ScanOutcome {
-  kReference,   ///< it became the reference, as the first scan: there is nothing near to compare it with
+  kReference,   ///< the first scan: it became the reference, there is nothing to compare it with
   kUpdated,     ///< its displacement corrected the estimate; where displacements are not used: its landmarks did
   kSlip,        ///< its displacement contradicts the wheels, and corrected the estimate: the wheels slipped
   kGated,       ///< its displacement contradicts the prediction beyond the gate: the wheels carry on
