@@ -17,7 +17,7 @@ constexpr std::size_t kPlaces = 3;    // at most
 constexpr double kTurnsApart = 0.32;  // [rad] of which any two are turned against each other by so much
 
 /// What a search looks at, and how finely.
-struct Steps {
+struct Resolution {
   double farthest = 20.0;  ///< [m] points beyond tell too little at such steps …
   double cell = 0.1;       ///< [m] … in x and y
   double yaw = 0.04;       ///< [rad]: half a metre off at 12 m are two steps
@@ -25,7 +25,7 @@ struct Steps {
   static constexpr int kCells = 200;  ///< from the origin to the farthest
 
   /// In a hall with most walls beyond that the cells are larger, and the turns finer, as walls so far away need.
-  explicit Steps(const std::vector<Eigen::Vector2d>& reference) {
+  explicit Resolution(const std::vector<Eigen::Vector2d>& reference) {
     if (reference.empty()) return;
     constexpr double kAround = 1.3;  // of the median distance
     constexpr double kLargest = 4.0;
@@ -56,11 +56,11 @@ class NearnessGrid {
   static constexpr std::uint8_t kOnIt = 4;
 
   /// block: cells to a side. A block is named by the cell in it with the least column and row.
-  NearnessGrid(const std::vector<Eigen::Vector2d>& points, const Steps& steps, int block) {
+  NearnessGrid(const std::vector<Eigen::Vector2d>& points, const Resolution& resolution, int block) {
     const int first = -kReach - (block - 1);
     for (const Eigen::Vector2d& point : points) {
-      if (point.norm() > steps.farthest) continue;
-      const Cell cell = cellOf(point, steps.cell);
+      if (point.norm() > resolution.farthest) continue;
+      const Cell cell = cellOf(point, resolution.cell);
       for (int row = first; row <= kReach; ++row) {
         for (int column = first; column <= kReach; ++column) {
           const int away = std::max(cellsAway(column, block), cellsAway(row, block));
@@ -80,7 +80,7 @@ class NearnessGrid {
 
  private:
   static constexpr int kReach = 2;
-  static constexpr int kHalf = Steps::kCells + kReach + kBlock;
+  static constexpr int kHalf = Resolution::kCells + kReach + kBlock;
   static constexpr int kWidth = 2 * kHalf + 1;
 
   /// Along one axis, of a block that begins so many cells beside a point.
@@ -111,19 +111,19 @@ class WideSearch {
  public:
   WideSearch(const PreparedScan& reference, const PreparedScan& current, const SE2& predicted,
              const WideSearchOptions& options, double price)
-      : step_(reference.points.point),
-        by_cell_(reference.points.point, step_, 1),
-        by_block_(reference.points.point, step_, kBlock),
+      : resolution_(reference.points.point),
+        by_cell_(reference.points.point, resolution_, 1),
+        by_block_(reference.points.point, resolution_, kBlock),
         points_(evenlyTaken(current.points.point)),
         predicted_(predicted),
-        turns_(static_cast<int>(options.yaw / step_.yaw)),
-        steps_(static_cast<int>(options.translation / step_.cell)),
+        turns_(static_cast<int>(options.yaw / resolution_.yaw)),
+        steps_(static_cast<int>(options.translation / resolution_.cell)),
         price_(price),
         cells_(points_.size()) {}
 
   /// The best places of those turns at which it is better than at the turns beside, the best first.
   std::vector<SE2> bestPlaces() {
-    const auto apart = static_cast<int>(std::lround(kTurnsApart / step_.yaw));
+    const auto apart = static_cast<int>(std::lround(kTurnsApart / resolution_.yaw));
     std::vector<Place> of_turns;
     for (int turn = -turns_; turn <= turns_; ++turn) of_turns.push_back(bestOfTurn(turn));
     std::sort(of_turns.begin(), of_turns.end(), [](const Place& a, const Place& b) { return a.score > b.score; });
@@ -134,8 +134,8 @@ class WideSearch {
           std::any_of(turns.begin(), turns.end(), [&](int turn) { return std::abs(turn - place.turn) < apart; });
       if (beside_better) continue;
       turns.push_back(place.turn);
-      best.emplace_back(predicted_.x + place.column * step_.cell, predicted_.y + place.row * step_.cell,
-                        predicted_.yaw + place.turn * step_.yaw);
+      best.emplace_back(predicted_.x + place.column * resolution_.cell, predicted_.y + place.row * resolution_.cell,
+                        predicted_.yaw + place.turn * resolution_.yaw);
       if (best.size() == kPlaces) break;
     }
     return best;
@@ -150,8 +150,8 @@ class WideSearch {
   };
 
   Place bestOfTurn(int turn) {
-    const RigidMotion motion({predicted_.x, predicted_.y, predicted_.yaw + turn * step_.yaw});
-    for (std::size_t k = 0; k < points_.size(); ++k) cells_[k] = cellOf(motion * points_[k], step_.cell);
+    const RigidMotion motion({predicted_.x, predicted_.y, predicted_.yaw + turn * resolution_.yaw});
+    for (std::size_t k = 0; k < points_.size(); ++k) cells_[k] = cellOf(motion * points_[k], resolution_.cell);
     Place best{by_cell_.sum(cells_, 0, 0) - priceOf(turn, 0, 0), turn, 0, 0};
     for (int row = -steps_; row <= steps_; row += kBlock) {
       for (int column = -steps_; column <= steps_; column += kBlock) {
@@ -173,14 +173,15 @@ class WideSearch {
   }
 
   double priceOf(int turn, int column, int row) const {
-    const double away = step_.cell * step_.cell * (column * column + row * row) + step_.yaw * step_.yaw * turn * turn;
+    const double away = resolution_.cell * resolution_.cell * (column * column + row * row) +
+                        resolution_.yaw * resolution_.yaw * turn * turn;
     return price_ * away * NearnessGrid::kOnIt * static_cast<double>(points_.size());
   }
 
   /// Of the cells of a block along an axis.
   static int nearestTo0(int first) { return std::clamp(0, first, first + kBlock - 1); }
 
-  Steps step_;
+  Resolution resolution_;
   NearnessGrid by_cell_;
   NearnessGrid by_block_;
   std::vector<Eigen::Vector2d> points_;

@@ -204,11 +204,11 @@ double DisplacementUpdates::bound(const Displacement& displacement) const {
 /// Where the scans refute what the wheels tell these are wrong, and any match will do that has its place.
 bool DisplacementUpdates::looksLikeSlip(const ScanReport& report) const {
   const Match& match = report.match;
-  if (!tellsAgainst(report.prediction, match, *report.scan)) return false;
-  if (outweighsWheels(match)) return true;
-  return options_.gate.trust_scans_on_slip && isPlaced(match) &&
-         matcher_.refutes(references_[match.displacement->clone], *report.scan,
-                          report.prediction.reference_from_current);
+  const bool believed =
+      outweighsWheels(match) || (options_.gate.trust_scans_on_slip && isPlaced(match) &&
+                                 matcher_.refutes(references_[match.displacement->clone], *report.scan,
+                                                  report.prediction.reference_from_current));
+  return believed && tellsAgainst(report.prediction, match, *report.scan);
 }
 
 /// Whether both scans see enough that speaks for the match and against the prediction. Where a laser sees little, a
