@@ -2,11 +2,12 @@
 
 #include <XmlRpcValue.h>
 #include <ros/param.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <sstream>
 #include <stdexcept>
+
+#include "sckf_odometry/ros/yaml_file.h"
 
 namespace sckf {
 
@@ -130,10 +131,10 @@ std::map<std::string, ParameterValue> ParameterServer::values() const {
 
 ParameterFile::ParameterFile(const std::string& path) {
   try {
-    const YAML::Node root = YAML::LoadFile(path);
+    const YAML::Node root = loadYamlFile(path);
     if (!root.IsMap() && !root.IsNull()) throw YAML::Exception(root.Mark(), "not a list of \"name: value\"");
     if (root.IsMap()) collect("", root, values_);
-  } catch (const std::exception& exception) {  // of yaml-cpp, or of the stream: the path is that of a folder
+  } catch (const std::exception& exception) {  // of yaml-cpp, or of the system
     throw std::invalid_argument("parameter file " + path + ": " + exception.what());
   }
 }

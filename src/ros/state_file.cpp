@@ -1,7 +1,6 @@
 #include "sckf_odometry/ros/state_file.h"
 
 #include <ros/console.h>
-#include <yaml-cpp/yaml.h>
 
 #include <cerrno>
 #include <cstdio>
@@ -10,11 +9,13 @@
 #include <limits>
 #include <sstream>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "sckf_odometry/core/covariance.h"
 #include "sckf_odometry/ros/constants.h"
+#include "sckf_odometry/ros/yaml_file.h"
 
 namespace sckf {
 
@@ -45,12 +46,11 @@ SavedPose parse(const YAML::Node& root) {
 }  // namespace
 
 std::optional<SavedPose> StateFile::read(std::string* problem) const {
-  if (!std::ifstream(path_)) {
-    if (errno != ENOENT) *problem = path_ + ": " + std::strerror(errno);
-    return std::nullopt;
-  }
   try {
-    return parse(YAML::LoadFile(path_));
+    return parse(loadYamlFile(path_));
+  } catch (const std::system_error& error) {
+    if (error.code() != std::errc::no_such_file_or_directory) *problem = path_ + ": " + error.code().message();
+    return std::nullopt;
   } catch (const std::exception& exception) {
     *problem = path_ + ": " + exception.what() + ": " + kContent + " expected";
     return std::nullopt;

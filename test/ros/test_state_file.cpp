@@ -73,6 +73,11 @@ TEST_F(StateFileTest, AFileThatIsNoneIsNamedWithWhatIsExpected) {
   }
 }
 
+TEST_F(StateFileTest, AFolderIsNamed) {
+  ASSERT_EQ(mkdir(path_.c_str(), 0700), 0);
+  EXPECT_EQ(refusal(), path_ + ": Is a directory");
+}
+
 TEST_F(StateFileTest, NumbersThatAreNoPoseAreRefused) {
   const std::string frames = "odom_frame: odom\nbase_frame: base_link\nstamp: 5\n";
   const std::string zeros = "covariance: [0, 0, 0, 0, 0, 0, 0, 0, 0]\n";
