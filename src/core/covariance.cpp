@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <cmath>
+#include <limits>
 #include <sstream>
 
 namespace sckf {
@@ -41,6 +42,14 @@ std::string problemOf(const SE2& pose, const Eigen::Matrix3d& covariance) {
             << "]: expected a symmetric, positive semi-definite matrix of finite values up to " << kLargest;
   }
   return problem.str();
+}
+
+double normalisedSquare(const Eigen::VectorXd& e, const Eigen::MatrixXd& P) {
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  const Eigen::LLT<Eigen::MatrixXd> factor(P);
+  if (factor.info() != Eigen::Success) return kInfinite;
+  const double square = e.dot(factor.solve(e));
+  return square >= 0.0 ? square : kInfinite;
 }
 
 Eigen::MatrixXd carriedOver(const Eigen::MatrixXd& J, const Eigen::VectorXd& variances) {

@@ -1,7 +1,6 @@
 #include "sckf_odometry/core/joint_covariance.h"
 
 #include <Eigen/Cholesky>
-#include <limits>
 
 #include "sckf_odometry/core/covariance.h"
 
@@ -27,11 +26,7 @@ Eigen::Matrix3d leverCorrection(const Innovation& innovation) {
 
 }  // namespace
 
-double Innovation::nis() const {
-  const Eigen::LLT<MatrixDD> factor(covariance);
-  if (factor.info() != Eigen::Success) return std::numeric_limits<double>::quiet_NaN();
-  return residual.dot(factor.solve(residual));
-}
+double Innovation::nis() const { return normalisedSquare(residual, covariance); }
 
 JointCovariance::JointCovariance(const Eigen::Matrix3d& pose_covariance)
     : P_kk_(pose_covariance),

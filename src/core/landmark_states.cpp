@@ -66,6 +66,7 @@ Innovation MultiCloneFilter::innovation(std::size_t landmark, const Sighting& si
 
 void MultiCloneFilter::update(std::size_t landmark, const Sighting& sighting) {
   const Measurement m = measurement(landmark, sighting);
+  places_told_ = true;
   correct(m, errors_.correlate(m), allStates(), clones_.back().error);
 }
 

@@ -174,10 +174,10 @@ double MultiCloneFilter::updateHeading(double yaw, double variance, double nis_b
 
 double MultiCloneFilter::update(const Measurement& m, double nis_bound) {
   const ErrorState::Correlation with_r = errors_.correlate(m);
-  const Eigen::LLT<MatrixXd> factor(with_r.innovation);
-  if (factor.info() != Eigen::Success) return kNoBound;
-  const double nis = m.residual.dot(factor.solve(m.residual));
-  if (nis <= nis_bound) correct(m, with_r, allStates(), std::nullopt);
+  const double nis = normalisedSquare(m.residual, with_r.innovation);
+  if (nis > nis_bound) return nis;
+  places_told_ = true;
+  correct(m, with_r, allStates(), std::nullopt);
   return nis;
 }
 
@@ -232,8 +232,16 @@ SE2* MultiCloneFilter::placeOf(const Part& part) {
 }
 
 /// What is learned of the wheels tells where the anchor must have been, too, since they led there: by so much it would
-/// be corrected, size × d.
-MatrixXd MultiCloneFilter::learnedOf(const Part& anchor, const ErrorState::Correlation& with_r) const {
+/// be corrected, size × d. Where nothing but displacements tells where poses are, all of its correction is learned so,
+/// but for what scans have in common. The covariance alone would not say so: what was learned before has not corrected
+/// the anchor either, and where the wheels led far, its error is radians that go with the noise of those displacements.
+MatrixXd MultiCloneFilter::learnedOf(const Part& anchor, const Measurement& measurement,
+                                     const ErrorState::Correlation& with_r) const {
+  if (!places_told_) {
+    const Measurement by_ranges{measurement.residual, {}, measurement.ranges, measurement.noise};
+    const MatrixXd by_poses = with_r.state - errors_.correlate(by_ranges).state;
+    return ErrorState::Correlation{by_poses, with_r.innovation}.gain(anchor);
+  }
   MatrixXd learned = MatrixXd::Zero(anchor.size, with_r.innovation.cols());
   for (const auto& part : {calibration_error_, gyro_bias_error_}) {
     if (!part) continue;
@@ -247,7 +255,8 @@ MatrixXd MultiCloneFilter::learnedOf(const Part& anchor, const ErrorState::Corre
 /// tells of the wheels is for the way to come. They led all the way behind, too. If that were corrected as well, all of
 /// it would turn about where the estimate began, odom → base_link would jump by metres, and pose and reference would
 /// come apart where the wheels slip, since corrections of that size do not just add.
-std::vector<ErrorState::Gain> MultiCloneFilter::gains(const ErrorState::Correlation& with_r,
+std::vector<ErrorState::Gain> MultiCloneFilter::gains(const Measurement& measurement,
+                                                      const ErrorState::Correlation& with_r,
                                                       const std::vector<Part>& parts,
                                                       const std::optional<Part>& anchor) {
   std::vector<ErrorState::Gain> gains;
@@ -255,7 +264,7 @@ std::vector<ErrorState::Gain> MultiCloneFilter::gains(const ErrorState::Correlat
   const MatrixXd best = with_r.gain();
   for (const Part& part : parts) gains.push_back({part, best.middleRows(part.row, part.size)});
   if (!anchor || !(calibration_error_ || gyro_bias_error_)) return gains;
-  const MatrixXd learned = learnedOf(*anchor, with_r);
+  const MatrixXd learned = learnedOf(*anchor, measurement, with_r);
   for (auto& [part, K] : gains) {
     if (placeOf(part) != nullptr) K -= learned;
   }
@@ -266,7 +275,7 @@ std::vector<Eigen::VectorXd> MultiCloneFilter::correct(const Measurement& measur
                                                        const ErrorState::Correlation& with_r,
                                                        const std::vector<Part>& parts,
                                                        const std::optional<Part>& anchor) {
-  const std::vector<ErrorState::Gain> gains = this->gains(with_r, parts, anchor);
+  const std::vector<ErrorState::Gain> gains = this->gains(measurement, with_r, parts, anchor);
   errors_.update(measurement, with_r, gains);
   std::vector<Eigen::VectorXd> corrections;
   corrections.reserve(parts.size());

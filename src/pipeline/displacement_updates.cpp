@@ -96,7 +96,7 @@ bool DisplacementUpdates::fuse(ScanReport& report, FusionMethod& filter) {
     return false;
   }
   report.outcome = ScanOutcome::kUpdated;
-  const auto contradicts = [&report] { return !(report.innovation->nis() <= report.nis_bound); };  // NaN does
+  const auto contradicts = [&report] { return report.innovation->nis() > report.nis_bound; };
   const bool slipped = contradicts() && looksLikeSlip(report);
   if (slipped) {
     allowForSlip(filter, report.prediction.reference_from_current.translation().norm());
@@ -136,7 +136,7 @@ void DisplacementUpdates::compareWithOlder(ScanReport& report, FusionMethod& fil
     const std::optional<Displacement> displacement = displacementFrom(clone, report, filter);
     if (!displacement) continue;
     const Innovation innovation = filter.innovation(*displacement);
-    if (!(innovation.nis() <= bound(*displacement))) continue;
+    if (innovation.nis() > bound(*displacement)) continue;
     filter.update(*displacement, innovation);
     ++report.older_references;
     lasers_[report.laser].place(report.stamp);

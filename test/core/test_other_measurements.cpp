@@ -243,5 +243,32 @@ TEST(OtherMeasurements, WhatIsLearnedOfTheWheelsDoesNotTurnTheWayBehind) {
       << "the reference has not moved";
 }
 
+/// It comes by wheels to where it sees first, 100 m on. Then it sees each step from the references before, whose scans
+/// have noise in common: nothing of that tells where it has come from.
+TEST(OtherMeasurements, DisplacementsDoNotTurnTheWayBehindHoweverFarTheWheelsLed) {
+  RandomInputs random(29);
+  StateOptions states;
+  states.calibration_std << 0.02, 0.05, 0.05, 0.1;
+  states.calibration_way = 1000.0;
+  MultiCloneFilter filter(SE2(), Eigen::Matrix3d::Zero(), states);
+  const OdometryIncrement step{SE2(0.5, 0.0, 0.0), Eigen::Vector3d(1e-3, 1e-3, 5e-3).asDiagonal()};
+  const Eigen::VectorXd R = Eigen::VectorXd::Constant(4, 1e-3);
+  for (int i = 0; i < 200; ++i) filter.propagate(step);
+  filter.clone(R);
+  const SE2 first = filter.pose();
+  for (int scan = 1; scan <= 10; ++scan) {
+    filter.propagate(step);
+    for (std::size_t clone = 0; clone < filter.clones(); ++clone) {
+      Displacement z = random.displacement(SE2(0.5 * static_cast<double>(clone + 1), 0.0, 0.0), 3, R, R, 0.02);
+      z.clone = clone;
+      filter.update(z, filter.innovation(z));
+    }
+    filter.clone(R);
+  }
+  const Eigen::Vector3d moved = error(filter.clonedPose(filter.clones() - 1), first);
+  EXPECT_LT(moved.head<2>().norm(), 0.05) << moved.transpose();
+  EXPECT_LT(std::abs(moved.z()), 0.02) << moved.z();
+}
+
 }  // namespace
 }  // namespace sckf

@@ -21,6 +21,10 @@ Eigen::Matrix3d withYawUpToATurn(const Eigen::Matrix3d& covariance);
 /// What is wrong with a pose and its covariance as an estimate, what was expected; empty if nothing is.
 std::string problemOf(const SE2& pose, const Eigen::Matrix3d& covariance);
 
+/// eᵀ P⁻¹ e: χ² with as many degrees of freedom as e has rows, if P is its covariance. Infinite if P has no inverse or
+/// something is no number, so that it exceeds every bound.
+double normalisedSquare(const Eigen::VectorXd& e, const Eigen::MatrixXd& P);
+
 /// J R Jᵀ, with the diagonal of R: what J (d × M, few rows) makes of independent errors.
 Eigen::MatrixXd carriedOver(const Eigen::MatrixXd& J, const Eigen::VectorXd& variances);
 

@@ -21,7 +21,8 @@ struct Innovation {
   Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3> gain;  ///< K (21) of the evolving state, 3 × d
   Eigen::MatrixXd with_state;  ///< E{x̃ rᵀ}, N × d, where a method has more states than the pose and its clone
 
-  /// Normalised innovation squared rᵀ S⁻¹ r: χ² with d degrees of freedom where the model is right.
+  /// Normalised innovation squared rᵀ S⁻¹ r: χ² with d degrees of freedom where the model is right. Infinite where S is
+  /// no covariance.
   double nis() const;
 };
 

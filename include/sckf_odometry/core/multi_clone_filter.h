@@ -97,9 +97,10 @@ class MultiCloneFilter : public LandmarkStates {
   /// anchor: a pose that stays where it is, whatever is learned of the wheels. Returns by what, part for part.
   std::vector<Eigen::VectorXd> correct(const Measurement& measurement, const ErrorState::Correlation& with_r,
                                        const std::vector<Part>& parts, const std::optional<Part>& anchor);
-  std::vector<ErrorState::Gain> gains(const ErrorState::Correlation& with_r, const std::vector<Part>& parts,
-                                      const std::optional<Part>& anchor);
-  Eigen::MatrixXd learnedOf(const Part& anchor, const ErrorState::Correlation& with_r) const;
+  std::vector<ErrorState::Gain> gains(const Measurement& measurement, const ErrorState::Correlation& with_r,
+                                      const std::vector<Part>& parts, const std::optional<Part>& anchor);
+  Eigen::MatrixXd learnedOf(const Part& anchor, const Measurement& measurement,
+                            const ErrorState::Correlation& with_r) const;
   SE2* placeOf(const Part& part);
 
   StateOptions options_;
@@ -120,6 +121,7 @@ class MultiCloneFilter : public LandmarkStates {
   double compass_from_world_ = 0.0;  // [rad]
   std::optional<Part> compass_error_;
   std::vector<Landmark> landmarks_;
+  bool places_told_ = false;  // by something that is no displacement: a landmark, a pose or a heading in the world
 };
 
 }  // namespace sckf
