@@ -7,6 +7,7 @@ import unittest
 import dynamic_reconfigure.client
 import numpy as np
 import rospy
+from sensor_msgs import point_cloud2
 
 import junit_runner
 import run_helpers as helpers
@@ -17,6 +18,7 @@ TIME_INCREMENT = 0.2 / 360  # [s]: a scan takes 0.2 s of the 0.23 s from one to 
 NAN = float('nan')
 WRONG = [-TIME_INCREMENT, 5.0 * TIME_INCREMENT, NAN, 1.5 * TIME_INCREMENT]  # negative, 1 s, none, longer than scans are apart
 NODES = {'deskewed': True, 'skewed': False, 'wrong': True, 'untold': True, 'switched': False}
+VIEWS = {'skewed': {'cloud_resolution': 0.5}, 'untold': {'visualization_rate': 0.0}}
 SWITCHED = simulated_bag.START + 10.0  # the instant at which it is told to undo the motion, too
 
 
@@ -35,7 +37,7 @@ class Deskewing(unittest.TestCase):
         cls.recorders = {node: helpers.Recorder(node + '/', node + '/sckf_odometry') for node in NODES}
         cls.loaders = [
             helpers.load_nodelet('/manager', '/%s/sckf_odometry' % node, deskew=deskew, publish_tf=False,
-                                 max_scan_delay=10000) for node, deskew in NODES.items()
+                                 max_scan_delay=10000, **VIEWS.get(node, {})) for node, deskew in NODES.items()
         ]
         messages = []
         cls.scans = 0
@@ -102,6 +104,18 @@ class Deskewing(unittest.TestCase):
                                                  *self.recorders['skewed'].trajectory('pose'))
             self.assertLess(distance, 1e-9, node)
             self.assertLess(angle, 1e-9, node)
+
+    def test_the_cloud_has_one_point_in_each_square(self):
+        self.assertTrue(self.recorders['skewed'].messages('cloud'))
+        cloud = self.recorders['skewed'].messages('cloud')[-1]
+        points = np.array(list(point_cloud2.read_points(cloud, field_names=('x', 'y'))))
+        self.assertGreater(len(points), 20)
+        self.assertEqual(len(np.unique(np.floor(points / VIEWS['skewed']['cloud_resolution']), axis=0)), len(points))
+
+    def test_without_a_rate_there_are_no_views(self):
+        for topic in ('path', 'path_odometry', 'cloud'):
+            self.assertEqual(self.recorders['untold'].messages(topic), [])
+            self.assertTrue(self.recorders['deskewed'].messages(topic))
 
     def test_the_scans_are_counted_by_what_became_of_their_motion(self):
         self.assertEqual(self.count('deskewed', 'scans deskewed'), self.scans)

@@ -125,6 +125,10 @@ TEST_F(StateFileTest, TheKeeperLeavesWhatIsOldOrOfAnotherTimeOrForgotten) {
   EXPECT_FALSE(PoseKeeper(options()).takeUp(kStamp + std::chrono::seconds(61)));
   EXPECT_FALSE(PoseKeeper(options()).takeUp(kStamp - std::chrono::seconds(5)));
   EXPECT_TRUE(PoseKeeper(options()).takeUp(kStamp + std::chrono::seconds(59)));
+  NodeOptions impatient = options();
+  impatient.state_max_age = 10.0;
+  EXPECT_FALSE(PoseKeeper(impatient).takeUp(kStamp + std::chrono::seconds(11)));
+  EXPECT_TRUE(PoseKeeper(impatient).takeUp(kStamp + std::chrono::seconds(9)));
   PoseKeeper forgetful(options());
   forgetful.forget();
   EXPECT_FALSE(forgetful.takeUp(kStamp));
