@@ -232,7 +232,10 @@ void ScanOdometry::setPose(const SE2& odom_from_base, const Eigen::Matrix3d& cov
   start_ = odom_from_base;
   start_covariance_ = covariance;
   if (!filter_) return;
-  propagateTo(stamp >= filter_stamp_ && odometry_.covers(stamp) ? stamp : odometry_.newest());
+  const bool is_past = stamp <= filter_stamp_;
+  const auto now = is_past ? broughtForward({stamp, {odom_from_base, covariance}}) : std::nullopt;
+  if (now) return begin(now->pose, now->covariance, filter_stamp_);
+  propagateTo(!is_past && odometry_.covers(stamp) ? stamp : odometry_.newest());
   begin(odom_from_base, covariance, filter_stamp_);
 }
 
@@ -267,6 +270,7 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
   }
   trail_.clear();
   filter_stamp_ = stamp;
+  leaveTrail();
   filter_twist_ = TwistWindow(options_.twist_window);
   odometry_.discardBefore(stamp);
   wheels_known_ = true;

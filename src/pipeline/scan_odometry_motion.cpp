@@ -68,7 +68,7 @@ void ScanOdometry::propagateTo(Stamp stamp) {
 }
 
 void ScanOdometry::leaveTrail() {
-  if (map_ != nullptr) trail_.add(filter_stamp_, filter_->pose(), options_.max_scan_delay);
+  trail_.add(filter_stamp_, filter_->pose(), options_.max_scan_delay);
 }
 
 /// Whether there is nothing to wait for: the IMU tells, or is silent.

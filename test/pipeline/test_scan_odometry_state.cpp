@@ -158,10 +158,26 @@ TEST(ScanOdometryState, ThePoseHoldsAtItsStamp) {
   EXPECT_GT(driven.pipeline.latest()->covariance(0, 0), kCovariance(0, 0));
 }
 
-/// A stamp of zero, one before the last scan, one from the future: none of which odometry is at hand.
-TEST(ScanOdometryState, WithoutOdometryAtItsStampThePoseHoldsNow) {
+/// As a pose that a person gives, or another node after some computing: the robot has driven and scanned since.
+TEST(ScanOdometryState, APoseOfBeforeTheLastScanIsBroughtForward) {
   const SimulatedDrive drive;
-  for (const Stamp stamp : {Stamp(0), at(1000), at(900000)}) {
+  for (const int ms : {1500, 3007}) {  // between scans, and at the last one
+    Driven driven(drive);
+    driven.odometry(0);
+    driven.run(0, 3020);
+    driven.pipeline.setPose(kElsewhere, kCovariance, at(ms));
+    EXPECT_EQ(driven.pipeline.latest()->stamp, at(3020));
+    const SE2 moved = between(kElsewhere, driven.pipeline.latest()->odom_from_base);
+    const Eigen::Vector3d e = error(moved, between(drive.truth(ms), drive.truth(3020)));
+    EXPECT_LT(e.cwiseAbs().maxCoeff(), 0.02) << ms << ": " << e.transpose();
+    EXPECT_GT(driven.pipeline.latest()->covariance(0, 0), kCovariance(0, 0));
+  }
+}
+
+/// A stamp of zero, one that is long past, one from the future: none of which the motion is at hand.
+TEST(ScanOdometryState, WithoutMotionSinceItsStampThePoseHoldsNow) {
+  const SimulatedDrive drive;
+  for (const Stamp stamp : {Stamp(0), at(-5000), at(900000)}) {
     Driven driven(drive);
     driven.odometry(0);
     driven.run(0, 3020);

@@ -69,7 +69,8 @@ class ScanOdometry {
   /// The estimate carried on by the wheels to the newest odometry; empty before the first odometry.
   std::optional<Estimate> latest() const;
 
-  /// The robot was there, whatever has been estimated; at the newest odometry, if none is at hand for the stamp.
+  /// The robot was there, whatever has been estimated. At a stamp before the last scan: brought forward by the motion
+  /// since, if it is no longer ago than scans may be late. Of which no motion is at hand: there it is now.
   /// Nothing is kept of what relates the estimate to its past: the next scan becomes the reference. What has been found
   /// of wheels, gyro and lasers stays. Before the first odometry: where the estimate starts. Throws as the constructor
   /// does.
@@ -145,7 +146,7 @@ class ScanOdometry {
   WaitingScans waiting_;
   WaitingPoses waiting_poses_;
   std::vector<PoseReport> pose_reports_;
-  Trail trail_;  // of filter_, where absolute poses are used
+  Trail trail_;  // of filter_
   std::vector<ScanReport> given_up_;
   std::optional<Stamp> wheels_heard_;  // the newest stamp of odometry, used or not
   Stamp motion_known_{0};              // until here the motion has been measured
