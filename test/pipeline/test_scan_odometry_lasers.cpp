@@ -116,6 +116,18 @@ TEST(Lasers, OneThatFailsLeavesTheOther) {
   }
 }
 
+TEST(Lasers, AScanThatWaitsForOneThatFailsIsNotTooLateForThat) {
+  PipelineOptions options = twoLasers();
+  options.scan_patience = 1.0;
+  options.max_scan_delay = 0.4;
+  TwoLasers robot;
+  ScanOdometry pipeline(options);
+  robot.run(pipeline, 6000, 6000, 1000, 50);
+  EXPECT_EQ(robot.count(kFront, ScanOutcome::kNoOdometry), 0U);
+  EXPECT_GT(robot.count(kFront, ScanOutcome::kUpdated), 150U);
+  EXPECT_LT(robot.worst, 0.06);
+}
+
 /// Where one is in a crowd now and then, the other tells that the wheels have not slipped.
 TEST(Lasers, OneInACrowdDoesNotMakeThePoseUncertain) {
   constexpr int kAlways = 6000;
