@@ -1,5 +1,6 @@
 #include "sckf_odometry/matching/displacement_search.h"
 
+#include <mrpt/maps/CSimplePointsMap.h>
 #include <mrpt/poses/CPose2D.h>
 #include <mrpt/poses/CPosePDF.h>
 #include <mrpt/slam/CICP.h>
@@ -101,7 +102,7 @@ SE2 DisplacementSearch::icp(const SE2& start) const {
   icp.options.minAbsStep_trans = icp.options.minAbsStep_rot = kNearEnough;
   mrpt::slam::CICP::TReturnInfo info;
   const mrpt::poses::CPose2D guess(start.x, start.y, start.yaw);
-  const auto mean = icp.Align(&reference_.map, &current_.map, guess, info)->getMeanVal();
+  const auto mean = icp.Align(reference_.map.get(), current_.map.get(), guess, info)->getMeanVal();
   return {mean.x(), mean.y(), mean.phi()};
 }
 

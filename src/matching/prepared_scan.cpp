@@ -1,5 +1,7 @@
 #include "sckf_odometry/matching/prepared_scan.h"
 
+#include <mrpt/maps/CSimplePointsMap.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -142,10 +144,12 @@ ScannedPoints readings(const LaserScan& scan, const Eigen::Isometry3d& base_from
 void describe(PreparedScan& scan, const SurfaceOptions& options) {
   scan.surface = fitSurfaces(scan.points, scan.range_noise, scan.angle_increment, options);
   scan.tree = PointTree(scan.points.point);
-  scan.map.reserve(scan.size());
+  const auto map = std::make_shared<mrpt::maps::CSimplePointsMap>();
+  map->reserve(scan.size());
   for (const Eigen::Vector2d& p : scan.points.point) {
-    scan.map.insertPointFast(static_cast<float>(p.x()), static_cast<float>(p.y()), 0.0F);
+    map->insertPointFast(static_cast<float>(p.x()), static_cast<float>(p.y()), 0.0F);
   }
+  scan.map = map;
 }
 
 }  // namespace

@@ -38,7 +38,6 @@ TEST(PreparedScan, KeepsEveryReadingOfAGoodScan) {
   ASSERT_NE(scan, nullptr);
   EXPECT_EQ(scan->beams, 91U);
   ASSERT_EQ(scan->size(), 91U);
-  EXPECT_EQ(scan->map.size(), 91U);
   for (const Eigen::Vector2d& p : scan->points.point) EXPECT_NEAR(p.x(), 2.0, 1e-6);
 }
 

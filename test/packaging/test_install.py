@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The installed package: complete, working as the devel space does, and its core usable by another package."""
+"""The installed package: complete, working as the devel space does, and its layers usable by another package."""
 
 import os
 import shutil
@@ -86,6 +86,11 @@ class Install(unittest.TestCase):
             self.assertIn(self.prefix + '/lib/libsckf_odometry_core.so', libraries)
             self.assertNotIn('mrpt', libraries)
             self.assertEqual(run(build + '/consumer').strip(), '0.5')
+
+    def test_another_package_of_ros_links_all_layers(self):
+        with tempfile.TemporaryDirectory() as build:
+            self.in_the_installed_space('cmake -S %s/catkin_consumer -B %s && cmake --build %s' % (HERE, build, build))
+            self.assertEqual(self.in_the_installed_space(build + '/catkin_consumer').strip(), '0.5')
 
 
 if __name__ == '__main__':

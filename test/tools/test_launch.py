@@ -1,16 +1,23 @@
 #!/usr/bin/python3
-"""The launch files, as roslaunch reads them: which parameters they set, and which they clear before."""
+"""The launch files: which parameters they set, and which they clear before; and what scripts/demo starts, as it runs."""
 from __future__ import annotations
 
 import os
+import socket
+import subprocess
+import sys
+import tempfile
 import unittest
 from pathlib import Path
 from typing import Any
 
+import rosbag
 import roslaunch.config
 import roslaunch.xmlloader
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "test" / "ros"))
+import simulated_bag  # noqa: E402
 
 
 def load(name: str, *arguments: str) -> Any:
@@ -36,6 +43,31 @@ class LaunchTest(unittest.TestCase):
             parameters = load("replay.launch", "bag:=some.bag", "rate:=10", f"name:={name}").params
             self.assertEqual(parameters[f"/{name}/max_scan_delay"].value, 50.0)
             self.assertEqual({key.split("/")[1] for key in parameters}, {name, "use_sim_time"})
+
+    def test_the_demo_plays_a_log_records_it_and_ends(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            bag, record = f"{folder}/drive.bag", f"{folder}/run.bag"
+            simulated_bag.write(bag, duration=10.0)
+            with socket.socket() as unused:
+                unused.bind(("localhost", 0))
+                port = unused.getsockname()[1]
+            environment = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{port}", "ROS_HOSTNAME": "localhost",
+                           "ROS_LOG_DIR": folder}
+            command = ["roslaunch", "--port", str(port), str(ROOT / "scripts" / "demo.launch"), f"bag:={bag}",
+                       f"record:={record}", "rate:=5"]
+            done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                                  timeout=120, check=False)
+            self.assertEqual(done.returncode, 0, done.stdout)
+            with rosbag.Bag(record) as recorded:
+                topics = recorded.get_type_and_topic_info().topics
+            with rosbag.Bag(bag) as played:
+                scans = played.get_message_count("/scan")
+            self.assertEqual(topics["/pose"].message_count, scans)
+            self.assertGreater(topics["/odometry/filtered"].message_count, 100)
+            said = subprocess.run([str(ROOT / "scripts" / "plot"), record, "--latency", "--output", f"{folder}/run.png"],
+                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+            self.assertEqual(said.returncode, 0, said.stdout)
+            self.assertGreater((Path(folder) / "run.png").stat().st_size, 10000)
 
 
 if __name__ == "__main__":

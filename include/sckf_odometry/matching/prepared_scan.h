@@ -1,8 +1,6 @@
 // A laser scan made ready for matching: points in base_link, the noise of their ranges, the surface around each.
 #pragma once
 
-#include <mrpt/maps/CSimplePointsMap.h>
-
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <memory>
@@ -14,6 +12,10 @@
 #include "sckf_odometry/matching/point_tree.h"
 #include "sckf_odometry/matching/scan_motion.h"
 #include "sckf_odometry/matching/surface.h"
+
+namespace mrpt::maps {
+class CSimplePointsMap;  // who includes this need not have MRPT
+}
 
 namespace sckf {
 
@@ -32,16 +34,16 @@ struct ScanOptions {
 /// Everything is in base_link at the stamp, projected to its x-y plane. Point i comes from beam points.beam[i].
 struct PreparedScan {
   Stamp stamp{0};
-  std::size_t beams = 0;                   ///< M: number of ranges used of the scan, read or not
-  double angle_increment = 0.0;            ///< between neighbouring beams [rad]
-  double range_noise = 0.0;                ///< std of one range, estimated from this scan [m]
-  double range_offset = 0.0;               ///< that has been added to each range [m]
-  EvenSweep sweep;                         ///< that has been undone
-  ScannedPoints points;                    ///< the readings
-  std::vector<Surface> surface;            ///< the surface around each point
-  PointTree tree;                          ///< the same points, for nearest neighbours
-  mrpt::maps::CSimplePointsMap map;        ///< and for CICP
-  FreeSpace free_space;                    ///< what the laser looked through
+  std::size_t beams = 0;                                    ///< M: number of ranges used of the scan, read or not
+  double angle_increment = 0.0;                             ///< between neighbouring beams [rad]
+  double range_noise = 0.0;                                 ///< std of one range, estimated from this scan [m]
+  double range_offset = 0.0;                                ///< that has been added to each range [m]
+  EvenSweep sweep;                                          ///< that has been undone
+  ScannedPoints points;                                     ///< the readings
+  std::vector<Surface> surface;                             ///< the surface around each point
+  PointTree tree;                                           ///< the same points, for nearest neighbours
+  std::shared_ptr<const mrpt::maps::CSimplePointsMap> map;  ///< and for CICP
+  FreeSpace free_space;                                     ///< what the laser looked through
   std::vector<Eigen::Vector2d> set_aside;  ///< what else the laser has seen: points that are not to be matched
 
   std::size_t size() const { return points.size(); }
