@@ -1,6 +1,7 @@
 """What the experiments have in common: what is asked for, tables, pictures, and what is told of them."""
 from __future__ import annotations
 
+import csv
 import json
 import warnings
 from dataclasses import dataclass, field
@@ -72,7 +73,9 @@ def simulate(setting: Setting, name: str) -> None:
 def read_table(path: Path) -> np.ndarray:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of no rows, which is told below
-        table = np.atleast_1d(np.genfromtxt(path, delimiter=",", names=True, dtype=None, encoding="utf-8"))
+        with open(path, newline="", encoding="utf-8") as file:  # where a reason has commas it is quoted
+            rows = [",".join(cell.replace(",", ";") for cell in row) for row in csv.reader(file)]
+        table = np.atleast_1d(np.genfromtxt(rows, delimiter=",", names=True, dtype=None, encoding="utf-8"))
     if table.size == 0:
         raise ExperimentError(f"{path}: expected rows, there are none: with these options nothing is simulated")
     return table

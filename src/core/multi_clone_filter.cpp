@@ -1,6 +1,7 @@
 #include "sckf_odometry/core/multi_clone_filter.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -175,7 +176,7 @@ double MultiCloneFilter::updateHeading(double yaw, double variance, double nis_b
 double MultiCloneFilter::update(const Measurement& m, double nis_bound) {
   const ErrorState::Correlation with_r = errors_.correlate(m);
   const double nis = normalisedSquare(m.residual, with_r.innovation);
-  if (nis > nis_bound) return nis;
+  if (!std::isfinite(nis) || nis > nis_bound) return nis;
   places_told_ = true;
   correct(m, with_r, allStates(), std::nullopt);
   return nis;
@@ -231,6 +232,23 @@ SE2* MultiCloneFilter::placeOf(const Part& part) {
   return nullptr;
 }
 
+/// E{x̃ rᵀ} of a part, size × d, as far as both have the noise of the measurement's scans in common: of each s = J z̃
+/// what r tells of it, and what that tells of the part.
+MatrixXd MultiCloneFilter::commonByRanges(const Part& part, const Measurement& m) const {
+  const Eigen::Index d = m.residual.size();
+  MatrixXd common = MatrixXd::Zero(part.size, d);
+  for (const auto& scan : m.ranges) {
+    const ErrorState::Correlation with_s = errors_.correlate({m.residual, {}, {scan}, MatrixXd::Zero(d, d)});
+    MatrixXd s_r = with_s.innovation;
+    for (const auto& [other, H] : m.terms) {
+      s_r += (H * with_s.state.middleRows(other.row, other.size)).transpose();
+    }
+    common +=
+        with_s.state.middleRows(part.row, part.size) * with_s.innovation.completeOrthogonalDecomposition().solve(s_r);
+  }
+  return common;
+}
+
 /// What is learned of the wheels tells where the anchor must have been, too, since they led there: by so much it would
 /// be corrected, size × d. Where nothing but displacements tells where poses are, all of its correction is learned so,
 /// but for what scans have in common. The covariance alone would not say so: what was learned before has not corrected
@@ -238,9 +256,8 @@ SE2* MultiCloneFilter::placeOf(const Part& part) {
 MatrixXd MultiCloneFilter::learnedOf(const Part& anchor, const Measurement& measurement,
                                      const ErrorState::Correlation& with_r) const {
   if (!places_told_) {
-    const Measurement by_ranges{measurement.residual, {}, measurement.ranges, measurement.noise};
-    const MatrixXd by_poses = with_r.state - errors_.correlate(by_ranges).state;
-    return ErrorState::Correlation{by_poses, with_r.innovation}.gain(anchor);
+    const MatrixXd by_poses = with_r.state.middleRows(anchor.row, anchor.size) - commonByRanges(anchor, measurement);
+    return with_r.innovation.llt().solve(by_poses.transpose()).transpose();
   }
   MatrixXd learned = MatrixXd::Zero(anchor.size, with_r.innovation.cols());
   for (const auto& part : {calibration_error_, gyro_bias_error_}) {

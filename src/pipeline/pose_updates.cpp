@@ -41,6 +41,10 @@ void Trail::add(Stamp stamp, const SE2& odom_from_base, double duration) {
   while (poses_.size() > 1 && poses_[1].stamp + toDuration(duration) < stamp) poses_.pop_front();
 }
 
+void Trail::move(const SE2& by) {
+  for (Entry& entry : poses_) entry.odom_from_base = compose(by, entry.odom_from_base);
+}
+
 std::optional<SE2> Trail::at(Stamp stamp) const {
   const auto after = firstFrom(poses_, stamp);
   if (after == poses_.end()) return std::nullopt;

@@ -233,10 +233,16 @@ void ScanOdometry::setPose(const SE2& odom_from_base, const Eigen::Matrix3d& cov
   start_covariance_ = covariance;
   if (!filter_) return;
   const bool is_past = stamp <= filter_stamp_;
-  const auto now = is_past ? broughtForward({stamp, {odom_from_base, covariance}}) : std::nullopt;
-  if (now) return begin(now->pose, now->covariance, filter_stamp_);
-  propagateTo(!is_past && odometry_.covers(stamp) ? stamp : odometry_.newest());
-  begin(odom_from_base, covariance, filter_stamp_);
+  PoseMeasurement now{odom_from_base, covariance};
+  if (const auto brought_forward = is_past ? broughtForward({stamp, now}) : std::nullopt) {
+    now = *brought_forward;
+  } else {
+    propagateTo(!is_past && odometry_.covers(stamp) ? stamp : odometry_.newest());
+  }
+  Trail behind = std::move(trail_);  // by which the next pose may be brought forward
+  behind.move(compose(now.pose, inverse(filter_->pose())));
+  begin(now.pose, now.covariance, filter_stamp_);
+  trail_ = std::move(behind);
 }
 
 void ScanOdometry::setOptions(const PipelineOptions& options) {

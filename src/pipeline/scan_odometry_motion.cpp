@@ -40,7 +40,7 @@ EvenSweep ScanOdometry::evenSweep(const WaitingScans::Entry& waiting) const {
 /// other lasers, holds it back.
 void ScanOdometry::followAtADistance() {
   Stamp too_old = odometry_.newest() - toDuration(options_.max_scan_delay);
-  const bool holds_back = !waiting_.empty() && (waiting_.endOfOldest() > waiting_.oldest() || olderMayCome());
+  const bool holds_back = !waiting_.empty() && (waiting_.endOfOldest() > waiting_.oldest() || options_.lasers > 1);
   if (holds_back) too_old = std::min(too_old, waiting_.oldest());
   if (too_old <= filter_stamp_) return;
   odometry_.discardBefore(filter_stamp_);  // for which a sample may have come just now
@@ -57,6 +57,8 @@ void ScanOdometry::propagateTo(Stamp stamp) {
     filter_twist_.add(filter_->refined(motion), dt);
     filter_->propagate(motion);
     filter_->age(dt);
+    filter_stamp_ = step.to.stamp;
+    leaveTrail();
     for (const MotionMeasurement& z : motion.measured) gyro_time_ += z.bias_time;
     if (!step.guess) continue;
     wheels_known_ = false;
@@ -65,12 +67,9 @@ void ScanOdometry::propagateTo(Stamp stamp) {
   filter_stamp_ = stamp;
   odometry_.discardBefore(stamp);
   imu_.discardBefore(stamp);
-  leaveTrail();
 }
 
-void ScanOdometry::leaveTrail() {
-  trail_.add(filter_stamp_, filter_->pose(), options_.max_scan_delay);
-}
+void ScanOdometry::leaveTrail() { trail_.add(filter_stamp_, filter_->pose(), options_.max_scan_delay); }
 
 /// Whether there is nothing to wait for: the IMU tells, or is silent.
 bool ScanOdometry::imuTells(Stamp stamp) const {

@@ -7,7 +7,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "sckf_odometry/ros/yaml_file.h"
+#include "yaml_file.h"
 
 namespace sckf {
 

@@ -15,7 +15,7 @@
 
 #include "sckf_odometry/core/covariance.h"
 #include "sckf_odometry/ros/constants.h"
-#include "sckf_odometry/ros/yaml_file.h"
+#include "yaml_file.h"
 
 namespace sckf {
 

@@ -1,4 +1,4 @@
-#include "sckf_odometry/ros/yaml_file.h"
+#include "yaml_file.h"
 
 #include <cerrno>
 #include <fstream>

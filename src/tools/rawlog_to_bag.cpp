@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "sckf_odometry/core/se2.h"
+#include "sckf_odometry/tools/output_file.h"
 #include "sckf_odometry/tools/progress_bar.h"
 #include "sckf_odometry/tools/rawlog_reader.h"
 
@@ -238,6 +239,9 @@ std::optional<Options> parseOptions(int argc, char** argv) {
   po::notify(values);
   if (options.rawlog.empty() || options.bag.empty()) throw po::error("a RAWLOG and a BAG are needed; see --help");
   if (options.ground_truth.empty() != options.tum.empty()) throw po::error("--ground-truth and --tum go together");
+  if (sckf::isSameFile(options.rawlog, options.bag)) {
+    throw po::error(options.bag + ": expected another file than the rawlog");
+  }
   if (!(options.period > 0.0)) throw po::error("--period must be positive");
   return options;
 }

@@ -317,6 +317,18 @@ std::optional<Arguments> parse(int argc, char** argv) {
   if (values.count("duration") != 0 && !(arguments.duration > 0.0))
     throw po::error("--duration: expected more than 0 s");
   if (arguments.trajectory.empty() && arguments.csv.empty()) throw po::error("--trajectory or --csv is needed");
+  const std::vector<std::pair<std::string, std::string>> outputs{
+      {"--trajectory", arguments.trajectory}, {"--csv", arguments.csv}, {"--map-trajectory", arguments.map_trajectory}};
+  for (const auto& [option, path] : outputs) {
+    if (sckf::isSameFile(path, arguments.bag)) {
+      throw po::error(option + " " + path + ": expected another file than the bag");
+    }
+    for (const auto& [other, same] : outputs) {
+      if (option != other && !path.empty() && path == same) {
+        throw po::error(option + " " + path + ": expected another file than " + other);
+      }
+    }
+  }
   for (std::string* topic : {&arguments.odom_topic, &arguments.imu_topic, &arguments.pose_update_topic}) {
     *topic = resolved(*topic);
   }

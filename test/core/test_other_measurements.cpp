@@ -270,5 +270,48 @@ TEST(OtherMeasurements, DisplacementsDoNotTurnTheWayBehindHoweverFarTheWheelsLed
   EXPECT_LT(std::abs(moved.z()), 0.02) << moved.z();
 }
 
+/// It stands, and each scan is compared with the same reference: the second tells of the reference's noise nothing new.
+TEST(OtherMeasurements, ARobotThatStandsDoesNotFollowTheNoiseOfEachScan) {
+  constexpr double kNoise = 0.01;  // [m] of a range
+  RandomInputs random(31);
+  StateOptions states;
+  states.calibration_std << 0.02, 0.05, 0.05, 0.1;
+  states.calibration_way = 1000.0;
+  MultiCloneFilter filter(SE2(), Eigen::Matrix3d::Zero(), states);
+  const OdometryIncrement step{SE2(0.5, 0.0, 0.1), Eigen::Vector3d(1e-3, 1e-3, 5e-3).asDiagonal()};
+  const Eigen::VectorXd R = Eigen::VectorXd::Constant(4, kNoise * kNoise);
+  const Eigen::MatrixXd J = 0.5 * random.gaussian(3, 4);
+  const auto seen = [&](const SE2& displacement, const Eigen::VectorXd& reference, const Eigen::VectorXd& current) {
+    const Eigen::Vector3d noise = J * (reference - current);
+    Displacement z = random.displacement(displacement, 3, R, R, 1e-3);
+    z.reference_from_current = corrected(displacement, noise);
+    z.observable.setIdentity();
+    z.J_reference = -J;
+    z.J_current = J;
+    return z;
+  };
+  Eigen::VectorXd reference = kNoise * random.gaussian(4, 1);
+  filter.clone(R);
+  for (int scan = 0; scan < 10; ++scan) {
+    filter.propagate(step);
+    const Eigen::VectorXd current = kNoise * random.gaussian(4, 1);
+    const Displacement z = seen(SE2(0.5, 0.0, 0.1), reference, current);
+    filter.update(z, filter.innovation(z));
+    filter.clone(R);
+    filter.forget(1);
+    reference = current;
+  }
+  double squared = 0.0;
+  SE2 before;
+  for (int scan = 0; scan < 100; ++scan) {
+    filter.propagate({SE2(), Eigen::Matrix3d::Zero()});
+    const Displacement z = seen(SE2(), reference, kNoise * random.gaussian(4, 1));
+    filter.update(z, filter.innovation(z));
+    if (scan >= 50) squared += error(filter.pose(), before).head<2>().squaredNorm() / 50;
+    before = filter.pose();
+  }
+  EXPECT_LT(std::sqrt(squared), 0.1 * kNoise) << "[m] from scan to scan";
+}
+
 }  // namespace
 }  // namespace sckf

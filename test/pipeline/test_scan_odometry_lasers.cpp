@@ -117,15 +117,17 @@ TEST(Lasers, OneThatFailsLeavesTheOther) {
 }
 
 TEST(Lasers, AScanThatWaitsForOneThatFailsIsNotTooLateForThat) {
-  PipelineOptions options = twoLasers();
-  options.scan_patience = 1.0;
-  options.max_scan_delay = 0.4;
-  TwoLasers robot;
-  ScanOdometry pipeline(options);
-  robot.run(pipeline, 6000, 6000, 1000, 50);
-  EXPECT_EQ(robot.count(kFront, ScanOutcome::kNoOdometry), 0U);
-  EXPECT_GT(robot.count(kFront, ScanOutcome::kUpdated), 150U);
-  EXPECT_LT(robot.worst, 0.06);
+  for (const double patience : {1.0, 0.99}) {  // a scan, or odometry, ends it
+    PipelineOptions options = twoLasers();
+    options.scan_patience = patience;
+    options.max_scan_delay = 0.4;
+    TwoLasers robot;
+    ScanOdometry pipeline(options);
+    robot.run(pipeline, 6000, 6000, 1000, 50);
+    EXPECT_EQ(robot.count(kFront, ScanOutcome::kNoOdometry), 0U) << patience;
+    EXPECT_GT(robot.count(kFront, ScanOutcome::kUpdated), 150U) << patience;
+    EXPECT_LT(robot.worst, 0.06);
+  }
 }
 
 /// Where one is in a crowd now and then, the other tells that the wheels have not slipped.

@@ -171,7 +171,28 @@ TEST(ScanOdometryState, APoseOfBeforeTheLastScanIsBroughtForward) {
     const Eigen::Vector3d e = error(moved, between(drive.truth(ms), drive.truth(3020)));
     EXPECT_LT(e.cwiseAbs().maxCoeff(), 0.02) << ms << ": " << e.transpose();
     EXPECT_GT(driven.pipeline.latest()->covariance(0, 0), kCovariance(0, 0));
+    // The next one, of before the one before was told.
+    driven.run(3020, 3220);
+    driven.pipeline.setPose(kElsewhere, kCovariance, at(2900));
+    const SE2 moved_again = between(kElsewhere, driven.pipeline.latest()->odom_from_base);
+    const Eigen::Vector3d again = error(moved_again, between(drive.truth(2900), drive.truth(3220)));
+    EXPECT_LT(again.cwiseAbs().maxCoeff(), 0.02) << ms << ": " << again.transpose();
   }
+}
+
+/// The way since is that of the wheels, not a straight line from scan to scan, and what the scan has corrected.
+TEST(ScanOdometryState, APoseOfBetweenScansFarApartIsBroughtForwardByTheWheels) {
+  const SimulatedDrive drive;
+  Driven driven(drive);
+  driven.odometry(0);
+  driven.run(0, 1000);
+  for (int ms = 1020; ms <= 4000; ms += 20) driven.pipeline.addOdometry(drive.odometry(ms));
+  driven.pipeline.addScan(drive.scan(3990), drive.laser.base_from_laser);
+  driven.process();
+  driven.pipeline.setPose(kElsewhere, kCovariance, at(2500));
+  const SE2 moved = between(kElsewhere, driven.pipeline.latest()->odom_from_base);
+  const Eigen::Vector3d e = error(moved, between(drive.wheels(2500), drive.wheels(4000)));
+  EXPECT_LT(e.cwiseAbs().maxCoeff(), 0.1) << e.transpose();
 }
 
 /// A stamp of zero, one that is long past, one from the future: none of which the motion is at hand.

@@ -313,6 +313,28 @@ class ReplayTest(unittest.TestCase):
             self.assertIn(f"{output}: cannot be written: {reason}", done.stderr)
         self.assertEqual(list(self.path("").glob("*.part")), [])
 
+    def test_an_output_replaces_no_input(self) -> None:
+        before = self.bag.read_bytes()
+        link = self.path("link.bag")
+        link.symlink_to(self.bag)
+        for option in ("--trajectory", "--csv"):
+            for path in (self.bag, link):
+                done = self.run_replay(self.bag, option, path)
+                self.assertEqual(done.returncode, 2)
+                self.assertIn(f"{option} {path}: expected another file than the bag", done.stderr)
+        done = self.run_replay(self.bag, "--csv", self.path("both"), "--trajectory", self.path("both"))
+        self.assertIn("expected another file than --", done.stderr)
+        self.assertEqual(self.bag.read_bytes(), before)
+
+    def test_what_a_link_leads_to_is_written_and_a_device_as_it_is(self) -> None:
+        link, target = self.path("link.tum"), self.path("target.tum")
+        target.write_text("old")
+        link.symlink_to(target)
+        self.replay(self.bag, "--trajectory", link, "--csv", "/dev/null")
+        self.assertTrue(link.is_symlink())
+        self.assertGreater(len(target.read_text().splitlines()), 30)
+        self.assertTrue(Path("/dev/null").is_char_device())
+
     def test_a_wrong_call_is_refused(self) -> None:
         for arguments in ((), (self.bag,), (self.bag, "--nonsense")):
             done = self.run_replay(*arguments)

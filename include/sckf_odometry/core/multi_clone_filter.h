@@ -99,6 +99,7 @@ class MultiCloneFilter : public LandmarkStates {
                                        const std::vector<Part>& parts, const std::optional<Part>& anchor);
   std::vector<ErrorState::Gain> gains(const Measurement& measurement, const ErrorState::Correlation& with_r,
                                       const std::vector<Part>& parts, const std::optional<Part>& anchor);
+  Eigen::MatrixXd commonByRanges(const Part& part, const Measurement& measurement) const;
   Eigen::MatrixXd learnedOf(const Part& anchor, const Measurement& measurement,
                             const ErrorState::Correlation& with_r) const;
   SE2* placeOf(const Part& part);

@@ -58,6 +58,8 @@ class Trail {
   void add(Stamp stamp, const SE2& odom_from_base, double duration);
   /// Interpolated; empty where nothing is kept.
   std::optional<SE2> at(Stamp stamp) const;
+  /// As if all had been elsewhere: by a displacement of odom.
+  void move(const SE2& by);
   void clear() { poses_.clear(); }
 
  private:
