@@ -3,6 +3,9 @@ from __future__ import annotations
 
 import argparse
 import math
+from pathlib import Path
+
+from matplotlib.backend_bases import FigureCanvasBase
 
 
 def topic(text: str) -> str:
@@ -10,6 +13,15 @@ def topic(text: str) -> str:
     if not text.strip("/"):
         raise argparse.ArgumentTypeError(f"expected the name of a topic: '{text}'")
     return text if text.startswith("/") else f"/{text}"
+
+
+def picture(text: str) -> str:
+    """A file of a kind that can be drawn; PNG where the name tells none."""
+    kinds = FigureCanvasBase.get_supported_filetypes()
+    path = Path(text)
+    if path.is_dir() or path.suffix[1:].lower() not in ("", *kinds):
+        raise argparse.ArgumentTypeError(f"expected a file, by its name one of {', '.join(sorted(kinds))}: {text}")
+    return text
 
 
 def not_negative(text: str) -> float:

@@ -202,6 +202,12 @@ class BagTest(unittest.TestCase):
         self.assertIn(complaint, done.stderr)
         self.assertNotIn("Traceback", done.stderr)
 
+    def test_a_picture_that_cannot_be_drawn_is_refused_before_anything_is_read(self) -> None:
+        for output in ("picture.foo", str(self.folder)):
+            done = self.run_plot("--output", output)
+            self.assertEqual(done.returncode, 2)
+            self.assertRegex(done.stderr, f"--output: expected a file, by its name one of .*png.*: {output}")
+
     def test_what_is_missing_is_named(self) -> None:
         self.check_complaint("run.bag")
         write_bag(self.bag, estimate=False)
