@@ -110,13 +110,18 @@ std::vector<ScanReport> ScanOdometry::process() {
   while (!waiting_.empty() && imuTells(waiting_.endOfOldest())) {
     const bool bracketed = filter_ && waiting_.endOfOldest() <= odometry_.newest();
     if (olderMayCome() || (!bracketed && !bridgeToOldestWaiting())) break;
-    held_back = held_back || waiting_.endOfOldest() > waiting_.oldest();
+    held_back = held_back || oldestHoldsBack();
     takePoses(waiting_.oldest());
     reports.push_back(take(waiting_.takeOldest()));
   }
   if (held_back) followAtADistance();
   if (filter_) takePoses(filter_stamp_);  // which come late
   return reports;
+}
+
+/// Of the scans that wait: for the end of its sweep, or for those of other lasers. The filter does not pass it meanwhile.
+bool ScanOdometry::oldestHoldsBack() const {
+  return waiting_.endOfOldest() > waiting_.oldest() || options_.lasers > 1;
 }
 
 /// Lasers need their time for a scan, the slow ones more; their stamps are of its beginning.

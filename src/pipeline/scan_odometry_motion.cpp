@@ -36,12 +36,10 @@ EvenSweep ScanOdometry::evenSweep(const WaitingScans::Entry& waiting) const {
 }
 
 /// Without scans the filter follows the wheels at a distance, so that the buffer stays small; from sample to sample, so
-/// that it makes no difference when the samples arrived. A scan that waits for the end of its sweep, or for those of
-/// other lasers, holds it back.
+/// that it makes no difference when the samples arrived.
 void ScanOdometry::followAtADistance() {
   Stamp too_old = odometry_.newest() - toDuration(options_.max_scan_delay);
-  const bool holds_back = !waiting_.empty() && (waiting_.endOfOldest() > waiting_.oldest() || options_.lasers > 1);
-  if (holds_back) too_old = std::min(too_old, waiting_.oldest());
+  if (!waiting_.empty() && oldestHoldsBack()) too_old = std::min(too_old, waiting_.oldest());
   if (too_old <= filter_stamp_) return;
   odometry_.discardBefore(filter_stamp_);  // for which a sample may have come just now
   const Stamp last = odometry_.lastUpTo(too_old);
