@@ -119,10 +119,9 @@ std::vector<ScanReport> ScanOdometry::process() {
   return reports;
 }
 
-/// Of the scans that wait: for the end of its sweep, or for those of other lasers. The filter does not pass it meanwhile.
-bool ScanOdometry::oldestHoldsBack() const {
-  return waiting_.endOfOldest() > waiting_.oldest() || options_.lasers > 1;
-}
+/// Of the scans that wait: for the end of its sweep, or for those of other lasers. The filter does not pass it
+/// meanwhile.
+bool ScanOdometry::oldestHoldsBack() const { return waiting_.endOfOldest() > waiting_.oldest() || options_.lasers > 1; }
 
 /// Lasers need their time for a scan, the slow ones more; their stamps are of its beginning.
 bool ScanOdometry::olderMayCome() const {
