@@ -243,10 +243,8 @@ void ScanOdometry::setPose(const SE2& odom_from_base, const Eigen::Matrix3d& cov
   } else {
     propagateTo(!is_past && odometry_.covers(stamp) ? stamp : odometry_.newest());
   }
-  Trail behind = std::move(trail_);  // by which the next pose may be brought forward
-  behind.move(compose(now.pose, inverse(filter_->pose())));
+  trail_.move(compose(now.pose, inverse(filter_->pose())));  // by which the next pose may be brought forward
   begin(now.pose, now.covariance, filter_stamp_);
-  trail_ = std::move(behind);
 }
 
 void ScanOdometry::setOptions(const PipelineOptions& options) {
@@ -278,7 +276,6 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
   } else {
     filter_ = makeFusionMethod(options_.method, odom_from_base, P, states);  // (6)(7)
   }
-  trail_.clear();
   filter_stamp_ = stamp;
   leaveTrail();
   filter_twist_ = TwistWindow(options_.twist_window);

@@ -18,6 +18,14 @@ constexpr OtherMeasurementsOptions kOptions;
 
 SensorStatistics simulate(const SimulatedSensors& sensors) { return simulateOtherMeasurements(sensors, kOptions); }
 
+/// At the origin, with what the pipeline estimates of wheels and laser by default.
+MultiCloneFilter withWheelsThatMayErr() {
+  StateOptions states;
+  states.calibration_std << 0.02, 0.05, 0.05, 0.1;
+  states.calibration_way = 1000.0;
+  return MultiCloneFilter(SE2(), Eigen::Matrix3d::Zero(), states);
+}
+
 void expectInBand(const std::vector<double>& means, int d, const std::string& what) {
   expectInBand(means, ChiSquaredBand(d, kOptions.runs), what);
 }
@@ -198,10 +206,7 @@ TEST(OtherMeasurements, BeginWithWhatIsKnownOfThem) {
 /// reverses, where there is nothing to see.
 TEST(OtherMeasurements, WhatWheelsTurnTheRobotByAheadTheyTurnItBackInReverse) {
   constexpr double kTurn = 0.05;  // [rad/m]
-  StateOptions states;
-  states.calibration_std << 0.02, 0.05, 0.05, 0.1;
-  states.calibration_way = 1000.0;
-  MultiCloneFilter filter(SE2(), Eigen::Matrix3d::Zero(), states);
+  MultiCloneFilter filter = withWheelsThatMayErr();
   SE2 truth;
   const auto drive = [&](double way) {
     truth = compose(truth, SE2(way, 0.0, kTurn * way));
@@ -223,10 +228,7 @@ TEST(OtherMeasurements, WhatWheelsTurnTheRobotByAheadTheyTurnItBackInReverse) {
 /// A robot that comes by wheels to where it sees first, 30 m on, and then slips by half a radian: what it did is seen
 /// to a centimetre. That tells of the wheels, too, which led the robot all the way.
 TEST(OtherMeasurements, WhatIsLearnedOfTheWheelsDoesNotTurnTheWayBehind) {
-  StateOptions states;
-  states.calibration_std << 0.02, 0.05, 0.05, 0.1;
-  states.calibration_way = 1000.0;
-  MultiCloneFilter filter(SE2(), Eigen::Matrix3d::Zero(), states);
+  MultiCloneFilter filter = withWheelsThatMayErr();
   const Eigen::Matrix3d Q = Eigen::Vector3d(1e-3, 1e-3, 1e-3).asDiagonal();
   for (int i = 0; i < 100; ++i) filter.propagate({SE2(0.3, 0.0, 0.01), Q});
   filter.clone(Eigen::VectorXd(0));
@@ -247,10 +249,7 @@ TEST(OtherMeasurements, WhatIsLearnedOfTheWheelsDoesNotTurnTheWayBehind) {
 /// have noise in common: nothing of that tells where it has come from.
 TEST(OtherMeasurements, DisplacementsDoNotTurnTheWayBehindHoweverFarTheWheelsLed) {
   RandomInputs random(29);
-  StateOptions states;
-  states.calibration_std << 0.02, 0.05, 0.05, 0.1;
-  states.calibration_way = 1000.0;
-  MultiCloneFilter filter(SE2(), Eigen::Matrix3d::Zero(), states);
+  MultiCloneFilter filter = withWheelsThatMayErr();
   const OdometryIncrement step{SE2(0.5, 0.0, 0.0), Eigen::Vector3d(1e-3, 1e-3, 5e-3).asDiagonal()};
   const Eigen::VectorXd R = Eigen::VectorXd::Constant(4, 1e-3);
   for (int i = 0; i < 200; ++i) filter.propagate(step);
@@ -274,10 +273,7 @@ TEST(OtherMeasurements, DisplacementsDoNotTurnTheWayBehindHoweverFarTheWheelsLed
 TEST(OtherMeasurements, ARobotThatStandsDoesNotFollowTheNoiseOfEachScan) {
   constexpr double kNoise = 0.01;  // [m] of a range
   RandomInputs random(31);
-  StateOptions states;
-  states.calibration_std << 0.02, 0.05, 0.05, 0.1;
-  states.calibration_way = 1000.0;
-  MultiCloneFilter filter(SE2(), Eigen::Matrix3d::Zero(), states);
+  MultiCloneFilter filter = withWheelsThatMayErr();
   const OdometryIncrement step{SE2(0.5, 0.0, 0.1), Eigen::Vector3d(1e-3, 1e-3, 5e-3).asDiagonal()};
   const Eigen::VectorXd R = Eigen::VectorXd::Constant(4, kNoise * kNoise);
   const Eigen::MatrixXd J = 0.5 * random.gaussian(3, 4);

@@ -20,6 +20,7 @@ import numpy as np
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 sys.path.insert(0, str(SCRIPTS))
+from experiment_base import read_table  # noqa: E402
 from experiment_landmarks import rms_after_alignment  # noqa: E402
 from experiment_logs import Estimates, end_error, mean_nees  # noqa: E402
 from programs import ProgramError, find_program  # noqa: E402
@@ -304,6 +305,14 @@ class Measures(unittest.TestCase):
         cos, sin = math.cos(1.0), math.sin(1.0)
         reference = np.column_stack((turned[0] + cos * truth[:, 0], turned[1] + sin * truth[:, 0], np.full(count, 1.0)))
         self.assertAlmostEqual(mean_nees(Trajectory(stamps, reference), estimates), 3.0, delta=0.15)
+
+    def test_a_table_may_have_texts_with_commas(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "scans.csv"
+            path.write_text('stamp,x,reason\n1.5,2.5,"its stamp, 1.5 s, is old"\n2.5,3.5,""\n')
+            table = read_table(path)
+        self.assertEqual(table["x"].tolist(), [2.5, 3.5])
+        self.assertEqual(table["reason"].tolist(), ["its stamp; 1.5 s; is old", ""])
 
 
 if __name__ == "__main__":

@@ -60,7 +60,6 @@ class Trail {
   std::optional<SE2> at(Stamp stamp) const;
   /// As if all had been elsewhere: by a displacement of odom.
   void move(const SE2& by);
-  void clear() { poses_.clear(); }
 
  private:
   struct Entry {
