@@ -4,6 +4,7 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
+from typing import Callable, Optional
 
 from matplotlib.backend_bases import FigureCanvasBase
 
@@ -32,3 +33,18 @@ def not_negative(text: str) -> float:
     if not (math.isfinite(value) and value >= 0.0):
         raise argparse.ArgumentTypeError(f"expected 0 or more, finite: {text}")
     return value
+
+
+def whole(least: int, most: Optional[int] = None) -> Callable[[str], int]:
+    """A whole number of a range."""
+    expected = f"a whole number, {least} or more" if most is None else f"a whole number, {least} to {most}"
+
+    def parse(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(f"expected {expected}: {text}") from error
+        if value < least or most is not None and value > most:
+            raise argparse.ArgumentTypeError(f"expected {expected}: {text}")
+        return value
+    return parse

@@ -1,6 +1,7 @@
 #include "sckf_odometry/experiments/one_dimension.h"
 
 #include <cmath>
+#include <stdexcept>
 
 #include "sckf_odometry/core/displacement_covariance.h"
 #include "sckf_odometry/experiments/random_draws.h"
@@ -31,6 +32,7 @@ Scan takeScan(const OneDimensionOptions& options, double position, double phase,
 /// (42): the mean of the differences over the features that both scans have.
 Covariance::Measurement match(const OneDimensionOptions& options, const Scan& reference, const Scan& current) {
   const long shared = reference.end() - current.first;
+  if (shared < 1) throw std::runtime_error("two scans share no feature: try a greater density, or a smaller field");
   const double weight = 1.0 / static_cast<double>(shared);
   Covariance::Measurement z;
   z.seen = Scalar::Identity();

@@ -5,11 +5,14 @@
 #include <filesystem>
 #include <functional>
 #include <iostream>
+#include <limits>
 #include <map>
+#include <sstream>
 
 #include "sckf_odometry/experiments/complexity.h"
 #include "sckf_odometry/experiments/csv_file.h"
 #include "sckf_odometry/tools/experiment_arguments.h"
+#include "sckf_odometry/tools/number_option.h"
 #include "sckf_odometry/tools/progress_bar.h"
 
 namespace sckf {
@@ -141,36 +144,57 @@ const Experiments& experiments() {
   return all;
 }
 
+/// Adds options for numbers, each with what it is by default.
+class NumberOptions {
+ public:
+  explicit NumberOptions(const std::string& caption) : options_(caption) {}
+
+  template <typename T>
+  NumberOptions& operator()(const std::string& name, T& target, const NumberRange<T>& range, const char* description) {
+    std::ostringstream by_default;
+    by_default << target;
+    options_.add_options()(name.c_str(), number(name, target, range)->default_value(by_default.str()), description);
+    return *this;
+  }
+
+  const boost::program_options::options_description& all() const { return options_; }
+
+ private:
+  boost::program_options::options_description options_;
+};
+
 boost::program_options::options_description optionsFor(Arguments& a) {
   namespace po = boost::program_options;
-  const auto value = [](auto* target) { return po::value(target)->default_value(*target); };
+  constexpr bool kAbove = true;
   po::options_description shown("options");
   // clang-format off
   shown.add_options()("help,h", "show this help")
-    ("output", value(&a.output), "folder for the tables")
-    ("runs", value(&a.runs), "of the Monte Carlo simulation; 0: 400, 200 and 40 of the first three below, 400 of odometry_models, 200 of the other extensions")
-    ("seed", value(&a.seed), "of the random numbers");
-  po::options_description one("one_dimension");
-  one.add_options()("density", value(&a.one_dimension.density), "features per metre")
-    ("field", value(&a.one_dimension.field), "range of the sensor [m]")
-    ("distance-std", value(&a.one_dimension.range_std), "std of a distance [m]");
-  po::options_description line("line_matching");
-  line.add_options()("range-std", value(&a.line_matching.range_std), "std of a range [m]")
-    ("odometry-noise", value(&a.line_matching.odometry_noise), "std of the wheels after 1 m [m and rad]")
-    ("spacing", value(&a.line_matching.spacing), "of the scans [m]")
-    ("beams", value(&a.line_matching.beams), "of a scan")
-    ("laps", value(&a.line_matching.laps), "times around the circle");
-  po::options_description stereo("visual_odometry");
-  stereo.add_options()("pixel-std", value(&a.visual_odometry.pixel_std), "std of a pixel coordinate")
-    ("features", value(&a.visual_odometry.features), "per cubic metre")
-    ("far", value(&a.visual_odometry.camera.far), "depth of the farthest features [m]");
-  po::options_description sweeps("deskewing");
-  sweeps.add_options()("sweep", value(&a.deskewing.sweep), "from the first beam of a scan to the last [s]");
-  po::options_description clouds("cloud_input");
-  clouds.add_options()("rings", value(&a.cloud_input.rings), "of the lidar, 2 and more")
-    ("pitch", value(&a.cloud_input.pitch), "of the lidar, forward [rad]");
+    ("output", po::value(&a.output)->default_value(a.output), "folder for the tables");
+  NumberOptions any("of more than one");
+  any("runs", a.runs, {0, 1000000}, "of the Monte Carlo simulation; 0: 400, 200 and 40 of the first three below, 400 of odometry_models, 200 of the other extensions")
+    ("seed", a.seed, {0, std::numeric_limits<std::int64_t>::max()}, "of the random numbers");
+  NumberOptions one("one_dimension");
+  one("density", a.one_dimension.density, {0.0, 1000.0, kAbove}, "features per metre")
+    ("field", a.one_dimension.field, {0.0, a.one_dimension.way, kAbove, " m"}, "range of the sensor [m]")
+    ("distance-std", a.one_dimension.range_std, {0.0, 10.0, kAbove, " m"}, "std of a distance [m]");
+  NumberOptions line("line_matching");
+  line("range-std", a.line_matching.range_std, {0.0, 10.0, kAbove, " m"}, "std of a range [m]")
+    ("odometry-noise", a.line_matching.odometry_noise, {0.0, 10.0, kAbove}, "std of the wheels after 1 m [m and rad]")
+    ("spacing", a.line_matching.spacing, {0.01, 5.0, !kAbove, " m"}, "of the scans [m]")
+    ("beams", a.line_matching.beams, {8, 10000}, "of a scan")
+    ("laps", a.line_matching.laps, {0.5, 100.0}, "times around the circle");
+  NumberOptions stereo("visual_odometry");
+  stereo("pixel-std", a.visual_odometry.pixel_std, {0.0, 10.0, kAbove}, "std of a pixel coordinate")
+    ("features", a.visual_odometry.features, {0.0, 10.0, kAbove}, "per cubic metre")
+    ("far", a.visual_odometry.camera.far, {a.visual_odometry.camera.near, 50.0, kAbove, " m"}, "depth of the farthest features [m]");
+  NumberOptions sweeps("deskewing");
+  sweeps("sweep", a.deskewing.sweep, {0.0, 1.0 / a.deskewing.run.scan_rate, !kAbove, " s"}, "from the first beam of a scan to the last [s]");
+  NumberOptions clouds("cloud_input");
+  clouds("rings", a.cloud_input.rings, {2, 128}, "of the lidar")
+    ("pitch", a.cloud_input.pitch, {-1.0, 1.0, !kAbove, " rad"}, "of the lidar, forward [rad]");
   // clang-format on
-  return shown.add(one).add(line).add(stereo).add(sweeps).add(clouds);
+  for (const NumberOptions* of : {&any, &one, &line, &stereo, &sweeps, &clouds}) shown.add(of->all());
+  return shown;
 }
 
 /// False if the help was asked for, and shown.
@@ -183,7 +207,6 @@ bool parse(int argc, char** argv, Arguments& arguments) {
   positional.add("name", 1);
   po::variables_map values;
   po::store(po::command_line_parser(argc, argv).options(all).positional(positional).run(), values);
-  po::notify(values);
   if (values.count("help") != 0) {
     std::cout << "usage: experiment_data NAME --output DIR [options]\n\nNAME:";
     for (const auto& [name, experiment] : experiments()) std::cout << " " << name;
@@ -191,13 +214,12 @@ bool parse(int argc, char** argv, Arguments& arguments) {
               << shown;
     return false;
   }
+  po::notify(values);
   if (experiments().count(arguments.name) == 0) throw po::error("there is no experiment of that name; see --help");
-  if (arguments.runs < 0) throw po::error("--runs must not be negative");
   if (arguments.runs > 0) {
     arguments.one_dimension.runs = arguments.line_matching.runs = arguments.visual_odometry.runs = arguments.runs;
     arguments.odometry_models.runs = arguments.several_lasers.runs = arguments.other_measurements.runs = arguments.runs;
   }
-  if (arguments.cloud_input.rings < 2) throw po::error("--rings must be 2 at least");
   arguments.one_dimension.seed = arguments.line_matching.seed = arguments.visual_odometry.seed = arguments.seed;
   arguments.deskewing.seed = arguments.cloud_input.seed = arguments.odometry_models.seed = arguments.seed;
   arguments.several_lasers.seed = arguments.mounted_lasers.seed = arguments.seed;
