@@ -61,6 +61,7 @@ CObservation2DRangeScan::Ptr pickScan(const CSensoryFrame& frame, std::optional<
 /// Reads entry by entry, because MRPT's own loader takes a damaged file for one that ends there.
 template <typename Visitor>
 void forEachEntry(const std::string& path, Visitor visit) {
+  if (std::filesystem::is_directory(path)) throw RawlogError(path + ": expected a rawlog: it is a folder");
   if (!std::filesystem::is_regular_file(path)) throw RawlogError(path + ": no such file");
   mrpt::io::CFileGZInputStream file;
   if (!file.open(path)) throw RawlogError(path + ": cannot be opened");

@@ -23,9 +23,11 @@
 #include <vector>
 
 #include "sckf_odometry/core/se2.h"
+#include "sckf_odometry/tools/number_option.h"
 #include "sckf_odometry/tools/output_file.h"
 #include "sckf_odometry/tools/progress_bar.h"
 #include "sckf_odometry/tools/rawlog_reader.h"
+#include "sckf_odometry/tools/topic_option.h"
 
 namespace {
 
@@ -142,6 +144,7 @@ void writeBag(const std::vector<RawlogRecord>& records, const Options& options) 
 
 /// MRPT's ground truth, a line "stamp x y yaw" per row, by its stamp [s].
 std::map<double, SE2> readGroundTruth(const std::string& path) {
+  if (std::filesystem::is_directory(path)) throw RawlogError(path + ": expected a text file: it is a folder");
   std::ifstream file(path);
   if (!file) throw RawlogError(path + ": cannot be opened");
   std::map<double, SE2> truth;
@@ -168,8 +171,8 @@ std::optional<SE2> truthOf(const RawlogRecord& record, const std::map<double, SE
 }
 
 /// Returns how many scans have a truth.
-size_t writeGroundTruth(const std::vector<RawlogRecord>& records, const Options& options) {
-  const std::map<double, SE2> truth = readGroundTruth(options.ground_truth);
+size_t writeGroundTruth(const std::vector<RawlogRecord>& records, const std::map<double, SE2>& truth,
+                        const Options& options) {
   std::ostringstream tum;
   size_t count = 0;
   for (const RawlogRecord& record : records) {
@@ -188,6 +191,8 @@ size_t writeGroundTruth(const std::vector<RawlogRecord>& records, const Options&
 }
 
 void convert(const Options& options) {
+  std::map<double, SE2> truth;
+  if (!options.ground_truth.empty()) truth = readGroundTruth(options.ground_truth);
   const sckf::Rawlog log = sckf::readRawlog(options.rawlog, options.sensor_label, options.period);
   if (!log.own_stamps) {
     std::cerr << options.rawlog << ": the scans' stamps are missing or do not increase: made up, " << options.period
@@ -200,7 +205,35 @@ void convert(const Options& options) {
   const double duration = (log.records.back().stamp - log.records.front().stamp).toSec();
   std::printf("%s: %zu scans, %.1f s\n", options.bag.c_str(), log.records.size(), duration);
   if (!options.ground_truth.empty()) {
-    std::printf("%s: %zu poses\n", options.tum.c_str(), writeGroundTruth(log.records, options));
+    std::printf("%s: %zu poses\n", options.tum.c_str(), writeGroundTruth(log.records, truth, options));
+  }
+}
+
+/// What is written replaces neither what is read nor each other.
+void checkFiles(const Options& options) {
+  const auto check = [](const std::string& output, const std::string& other, const std::string& what) {
+    if (!output.empty() && (output == other || sckf::isSameFile(output, other))) {
+      throw boost::program_options::error(output + ": expected another file than " + what);
+    }
+  };
+  check(options.bag, options.rawlog, "the rawlog");
+  check(options.bag, options.ground_truth, "that of --ground-truth");
+  check(options.tum, options.rawlog, "the rawlog");
+  check(options.tum, options.ground_truth, "that of --ground-truth");
+  check(options.tum, options.bag, "the bag");
+}
+
+/// By their options: none is empty, and none comes twice.
+void checkNames(const std::map<std::string, std::string>& names, const std::string& kind) {
+  std::map<std::string, std::string> options;
+  for (const auto& [option, name] : names) {
+    const auto fail = [&, &option = option, &name = name](const std::string& expected) {
+      throw boost::program_options::error("--" + option + " '" + name + "': expected " + expected);
+    };
+    if (name.empty()) fail("the name of a " + kind);
+    if (name == "/tf_static") fail("another topic than that of the laser's place");
+    const auto [other, is_new] = options.emplace(name, option);
+    if (!is_new) fail("another " + kind + " than --" + other->second);
   }
 }
 
@@ -214,7 +247,7 @@ std::optional<Options> parseOptions(int argc, char** argv) {
     ("ground-truth", po::value(&options.ground_truth), "MRPT's ground truth, a text file with lines: stamp x y yaw")
     ("tum", po::value(&options.tum), "write the ground truth of every scan to this TUM file")
     ("sensor-label", po::value(&options.sensor_label), "which laser, if there are several")
-    ("period", po::value(&options.period)->default_value(options.period, "0.1"),
+    ("period", sckf::number("period", options.period, {1e-4, 1e3, false, " s"})->default_value("0.1"),
      "seconds between scans if the log's stamps are missing or do not increase; all are then made up")
     ("scan-topic", po::value(&options.scan_topic)->default_value(options.scan_topic), "")
     ("odom-topic", po::value(&options.odom_topic)->default_value(options.odom_topic), "")
@@ -239,10 +272,13 @@ std::optional<Options> parseOptions(int argc, char** argv) {
   po::notify(values);
   if (options.rawlog.empty() || options.bag.empty()) throw po::error("a RAWLOG and a BAG are needed; see --help");
   if (options.ground_truth.empty() != options.tum.empty()) throw po::error("--ground-truth and --tum go together");
-  if (sckf::isSameFile(options.rawlog, options.bag)) {
-    throw po::error(options.bag + ": expected another file than the rawlog");
-  }
-  if (!(options.period > 0.0)) throw po::error("--period must be positive");
+  checkFiles(options);
+  options.scan_topic = sckf::topicOf("scan-topic", options.scan_topic);
+  options.odom_topic = sckf::topicOf("odom-topic", options.odom_topic);
+  checkNames({{"scan-topic", options.scan_topic}, {"odom-topic", options.odom_topic}}, "topic");
+  checkNames(
+      {{"odom-frame", options.odom_frame}, {"base-frame", options.base_frame}, {"laser-frame", options.laser_frame}},
+      "frame");
   return options;
 }
 

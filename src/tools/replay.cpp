@@ -7,7 +7,9 @@
 #include <chrono>
 #include <cstdio>
 #include <deque>
+#include <filesystem>
 #include <iostream>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -20,10 +22,12 @@
 #include "sckf_odometry/ros/parameters.h"
 #include "sckf_odometry/ros/range_message.h"
 #include "sckf_odometry/ros/tf_input.h"
+#include "sckf_odometry/tools/number_option.h"
 #include "sckf_odometry/tools/progress_bar.h"
 #include "sckf_odometry/tools/refusals.h"
 #include "sckf_odometry/tools/replay_statistics.h"
 #include "sckf_odometry/tools/replay_tables.h"
+#include "sckf_odometry/tools/topic_option.h"
 
 namespace sckf {
 
@@ -43,9 +47,6 @@ struct Arguments {
   double start = 0.0;     ///< [s] after the bag's begin
   double duration = 0.0;  ///< [s], 0: to its end
 };
-
-/// As bags name it.
-std::string resolved(const std::string& topic) { return !topic.empty() && topic.front() == '/' ? topic : "/" + topic; }
 
 class Replay {
  public:
@@ -67,13 +68,8 @@ class Replay {
 
   void run() {
     rosbag::Bag bag;
-    try {
-      bag.open(arguments_.bag, rosbag::bagmode::Read);
-    } catch (const rosbag::BagException& exception) {
-      throw std::runtime_error(arguments_.bag + ": " + exception.what());
-    }
-    const ros::Time begin = beginOf(bag);
-    const ros::Time end = arguments_.duration > 0.0 ? begin + ros::Duration(arguments_.duration) : ros::TIME_MAX;
+    open(bag);
+    const auto [begin, end] = partOf(bag);
     std::vector<std::string> topics{"/tf", arguments_.odom_topic, arguments_.imu_topic, arguments_.pose_update_topic};
     topics.insert(topics.end(), scan_topics_.begin(), scan_topics_.end());
     rosbag::View view(bag, rosbag::TopicQuery("/tf_static"));  // holds ever after
@@ -103,15 +99,30 @@ class Replay {
  private:
   bool takesClouds() const { return options_.node.use_cloud_input; }
 
-  ros::Time beginOf(const rosbag::Bag& bag) const {
+  void open(rosbag::Bag& bag) const {
+    const std::string expected = arguments_.bag + ": expected a bag: ";
+    if (std::filesystem::is_directory(arguments_.bag)) throw std::runtime_error(expected + "it is a folder");
+    try {
+      bag.open(arguments_.bag, rosbag::bagmode::Read);
+    } catch (const rosbag::BagException& exception) {
+      throw std::runtime_error(expected + exception.what());
+    }
+  }
+
+  /// From when to when the bag is replayed.
+  std::pair<ros::Time, ros::Time> partOf(const rosbag::Bag& bag) const {
     rosbag::View all(bag);
     if (all.size() == 0) throw std::runtime_error(arguments_.bag + ": no messages");
     const double duration = (all.getEndTime() - all.getBeginTime()).toSec();
-    if (arguments_.start <= duration) return all.getBeginTime() + ros::Duration(arguments_.start);
-    std::ostringstream text;
-    text << arguments_.bag << ": --start " << arguments_.start << ": no more than the bag's " << duration
-         << " s expected";
-    throw std::runtime_error(text.str());
+    if (arguments_.start > duration) {
+      std::ostringstream text;
+      text << arguments_.bag << ": --start " << arguments_.start << ": no more than the bag's " << duration
+           << " s expected";
+      throw std::runtime_error(text.str());
+    }
+    const ros::Time begin = all.getBeginTime() + ros::Duration(arguments_.start);
+    const bool to_end = arguments_.duration == 0.0 || arguments_.start + arguments_.duration >= duration;
+    return {begin, to_end ? ros::TIME_MAX : begin + ros::Duration(arguments_.duration)};
   }
 
   /// Throws where nothing, or too little, has come of what the estimate is made of.
@@ -280,6 +291,7 @@ class Replay {
 /// Nothing if the help was asked for, and shown.
 std::optional<Arguments> parse(int argc, char** argv) {
   namespace po = boost::program_options;
+  constexpr double kNoEnd = std::numeric_limits<double>::max();
   Arguments arguments;
   po::options_description shown("options");
   // clang-format off
@@ -289,8 +301,8 @@ std::optional<Arguments> parse(int argc, char** argv) {
      "write what became of each scan; the innovation is along the directions that the scans see, in m")
     ("params", po::value(&arguments.params), "parameter file, as config/sckf_odometry.yaml")
     ("method", po::value(&arguments.method), "instead of the parameter file's method")
-    ("start", po::value(&arguments.start), "begin so many seconds after the begin of the bag")
-    ("duration", po::value(&arguments.duration), "take no more than so many seconds of it")
+    ("start", number("start", arguments.start, {0.0, kNoEnd, false, " s"}), "begin so many seconds after the begin of the bag")
+    ("duration", number("duration", arguments.duration, {0.0, kNoEnd, true, " s"}), "take no more than so many seconds of it")
     ("scan-topic", po::value(&arguments.scan_topics),
      "instead of the parameter file's scan_topics; again for each further laser")
     ("odom-topic", po::value(&arguments.odom_topic)->default_value(arguments.odom_topic), "")
@@ -313,9 +325,6 @@ std::optional<Arguments> parse(int argc, char** argv) {
   }
   po::notify(values);
   if (arguments.bag.empty()) throw po::error("a BAG is needed; see --help");
-  if (!(arguments.start >= 0.0)) throw po::error("--start: expected 0 s or more");
-  if (values.count("duration") != 0 && !(arguments.duration > 0.0))
-    throw po::error("--duration: expected more than 0 s");
   if (arguments.trajectory.empty() && arguments.csv.empty()) throw po::error("--trajectory or --csv is needed");
   const std::vector<std::pair<std::string, std::string>> outputs{
       {"--trajectory", arguments.trajectory}, {"--csv", arguments.csv}, {"--map-trajectory", arguments.map_trajectory}};
@@ -329,19 +338,28 @@ std::optional<Arguments> parse(int argc, char** argv) {
       }
     }
   }
-  for (std::string* topic : {&arguments.odom_topic, &arguments.imu_topic, &arguments.pose_update_topic}) {
-    *topic = resolved(*topic);
-  }
+  arguments.odom_topic = topicOf("odom-topic", arguments.odom_topic);
+  arguments.imu_topic = topicOf("imu-topic", arguments.imu_topic);
+  arguments.pose_update_topic = topicOf("pose-update-topic", arguments.pose_update_topic);
+  for (const std::string& topic : arguments.scan_topics) topicOf("scan-topic", topic);
   return arguments;
+}
+
+Options optionsOf(const std::string& file) {
+  const ParameterFile parameters(file);
+  std::vector<std::string> remarks;
+  try {
+    const Options options = readOptions(parameters, &remarks);
+    for (const std::string& remark : remarks) std::cerr << file << ": " << remark << "\n";
+    return options;
+  } catch (const std::invalid_argument& bad) {
+    throw std::invalid_argument("parameter file " + file + ": " + bad.what());
+  }
 }
 
 Options optionsFor(const Arguments& arguments) {
   Options options;
-  if (!arguments.params.empty()) {
-    std::vector<std::string> remarks;
-    options = sckf::readOptions(ParameterFile(arguments.params), &remarks);
-    for (const std::string& remark : remarks) std::cerr << arguments.params << ": " << remark << "\n";
-  }
+  if (!arguments.params.empty()) options = optionsOf(arguments.params);
   if (!arguments.method.empty()) options.pipeline.method = arguments.method;
   if (!arguments.scan_topics.empty()) options.node.scan_topics = arguments.scan_topics;
   options.pipeline.lasers = options.node.scan_topics.size();

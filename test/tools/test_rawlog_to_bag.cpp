@@ -20,6 +20,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <map>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -275,6 +276,9 @@ TEST_F(RawlogToBag, WhatCannotBeConvertedIsNamedAndLeavesNoBag) {
     EXPECT_FALSE(fs::exists(bag_path().string() + ".part"));
   };
   expect(folder / "none.rawlog", "none.rawlog: no such file");
+  expect(folder, folder.string() + ": expected a rawlog: it is a folder");
+  expect(save(makeRawlog()), folder.string() + ": expected a text file: it is a folder",
+         "--tum " + (folder / "truth.tum").string() + " --ground-truth " + folder.string());
   std::ofstream(folder / "text.rawlog") << "this is not a rawlog, only a line of text\n";
   expect(folder / "text.rawlog", "text.rawlog: not an MRPT rawlog");
 
@@ -313,8 +317,52 @@ TEST_F(RawlogToBag, ADamagedLogIsNotTakenForAShortOne) {
 TEST_F(RawlogToBag, UsageErrorsAreTold) {
   EXPECT_EQ(run(save(makeRawlog()), "--tum x.tum"), 2);
   EXPECT_NE(complaint.find("--ground-truth and --tum go together"), std::string::npos) << complaint;
-  EXPECT_EQ(run(save(makeRawlog()), "--period 0"), 2);
   EXPECT_EQ(run(save(makeRawlog()), "--nonsense"), 2);
+}
+
+TEST_F(RawlogToBag, OptionsThatCannotBeAreRefusedWithWhatIsExpected) {
+  const fs::path rawlog = save(makeRawlog());
+  const auto expect = [&](const std::string& option, const std::string& value, const std::string& what) {
+    EXPECT_EQ(run(rawlog, option + " '" + value + "'"), 2) << option << " " << value;
+    EXPECT_NE(complaint.find(what), std::string::npos) << complaint;
+    EXPECT_FALSE(fs::exists(bag_path()));
+  };
+  for (const std::string value : {"0", "-1", "foo", "inf", "1e300", "1e-300"}) {
+    expect("--period", value, "--period " + value + ": expected 0.0001 to 1000 s");
+  }
+  for (const std::string option : {"--scan-topic", "--odom-topic"}) {
+    for (const std::string value : {"", "/", "a b", "~scan"}) {
+      expect(option, value, option + " '" + value + "': expected the name of a topic");
+    }
+    expect(option, "/tf_static", "expected another topic than that of the laser's place");
+  }
+  expect("--scan-topic", "odom", "--scan-topic '/odom': expected another topic than --odom-topic");
+  for (const std::string option : {"--odom-frame", "--base-frame", "--laser-frame"}) {
+    expect(option, "", option + " '': expected the name of a frame");
+  }
+  expect("--odom-frame", "base_link", "--odom-frame 'base_link': expected another frame than --base-frame");
+}
+
+TEST_F(RawlogToBag, ATopicHasItsSlashInTheBag) {
+  ASSERT_EQ(run(save(makeRawlog()), "--scan-topic front/scan --odom-topic wheels"), 0) << complaint;
+  openBag();
+  EXPECT_EQ(messages<sensor_msgs::LaserScan>(bag, "/front/scan").size(), 3u);
+  EXPECT_EQ(messages<nav_msgs::Odometry>(bag, "/wheels").size(), 3u);
+}
+
+TEST_F(RawlogToBag, WhatIsWrittenReplacesNothingThatIsReadNorTheBag) {
+  const fs::path rawlog = save(makeRawlog());
+  const fs::path truth = folder / "truth.txt";
+  std::ofstream(truth) << kStart << " 0 0 0\n";
+  const std::string before = contents(rawlog);
+  for (const auto& [tum, what] : std::map<fs::path, std::string>{
+           {rawlog, "the rawlog"}, {truth, "that of --ground-truth"}, {bag_path(), "the bag"}}) {
+    EXPECT_EQ(run(rawlog, "--ground-truth " + truth.string() + " --tum " + tum.string()), 2);
+    EXPECT_NE(complaint.find(tum.string() + ": expected another file than " + what), std::string::npos) << complaint;
+  }
+  EXPECT_EQ(contents(rawlog), before);
+  EXPECT_EQ(lines(truth), 1u);
+  EXPECT_FALSE(fs::exists(bag_path()));
 }
 
 class ShippedLog : public RawlogToBag {

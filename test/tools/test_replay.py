@@ -105,14 +105,19 @@ class ReplayTest(unittest.TestCase):
         inside = stamps[(stamps >= begin) & (stamps <= end)]
         self.assertTrue(set(np.round(part.stamps, 6)) <= set(np.round(inside, 6)), (part.stamps, inside))
         self.assertGreaterEqual(len(part.stamps), len(inside) - 2)
+        self.assertEqual(list(self.trajectory("--start", "3", "--duration", "1e300").stamps),
+                         list(self.trajectory("--start", "3").stamps))
         rest = self.trajectory("--start", "3").stamps
         self.assertEqual(rest[-1], stamps[-1])
         self.assertAlmostEqual(rest[0], part.stamps[0])
 
     def test_a_part_that_is_none(self) -> None:
         for option, value, expected in (("--start", "-1", "0 s or more"), ("--start", "nan", "0 s or more"),
-                                        ("--duration", "0", "more than 0 s"), ("--duration", "-2", "more than 0 s")):
-            self.assertIn(f"{option}: expected {expected}", self.refused(self.bag, f"{option}={value}"))
+                                        ("--start", "foo", "0 s or more"), ("--start", "3s", "0 s or more"),
+                                        ("--duration", "0", "more than 0 s"), ("--duration", "-2", "more than 0 s"),
+                                        ("--duration", "inf", "more than 0 s")):
+            said = self.refused(self.bag, f"{option}={value}")
+            self.assertIn(f"replay: {option} {value}: expected {expected}\n", said)
         self.assertRegex(self.refused(self.bag, "--start", "1000"), r"--start 1000: no more than the bag's 1[0-9.]+ s expected")
 
     def test_absolute_poses_and_an_imu_of_the_bag_are_used_if_asked_for(self) -> None:
@@ -221,8 +226,7 @@ class ReplayTest(unittest.TestCase):
         params = self.path("bad.yaml")
         params.write_text("gate_probability: 1.5\n", encoding="utf-8")
         said = self.refused(self.bag, "--params", params)
-        self.assertIn("gate_probability", said)
-        self.assertIn("1.5", said)
+        self.assertIn(f"parameter file {params}: bad parameters:\n  gate_probability = 1.5: a number in (0, 1) expected", said)
 
     def test_an_unknown_parameter_is_named(self) -> None:
         params = self.path("unknown.yaml")
@@ -244,12 +248,22 @@ class ReplayTest(unittest.TestCase):
         self.assertIn("sckf_nc", said)
 
     def test_a_missing_bag_is_named(self) -> None:
-        self.assertIn("nowhere.bag", self.refused(self.path("nowhere.bag")))
+        self.assertIn("nowhere.bag: expected a bag: ", self.refused(self.path("nowhere.bag")))
 
-    def test_a_file_that_is_no_bag_is_refused(self) -> None:
-        text = self.path("text.bag")
+    def test_what_is_no_bag_is_refused(self) -> None:
+        text, empty = self.path("text.bag"), self.path("empty.bag")
         text.write_text("not a bag\n", encoding="utf-8")
-        self.refused(text)
+        empty.touch()
+        for path in (text, empty):
+            self.assertIn(f"{path}: expected a bag: ", self.refused(path))
+        self.assertIn(f"{self.folder.name}: expected a bag: it is a folder", self.refused(self.folder.name))
+
+    def test_what_is_no_name_of_a_topic_is_refused(self) -> None:
+        for option in ("--scan-topic", "--odom-topic", "--imu-topic", "--pose-update-topic"):
+            for name in ("", "/", "front scan", "~scan"):
+                done = self.run_replay(self.bag, "--csv", "/dev/null", option, name)
+                self.assertEqual(done.returncode, 2, done.stderr)
+                self.assertIn(f"replay: {option} '{name}': expected the name of a topic: ", done.stderr)
 
     def test_a_topic_without_scans_is_named(self) -> None:
         expected = "no sensor_msgs/LaserScan on /front/scan; see --scan-topic"
