@@ -83,6 +83,7 @@ class Replay {
     progress.finish();
     refusals_.finish();
     checkInput();
+    warnOfOthers();
     if (!waiting_.empty()) {
       std::fprintf(stderr, "%zu scans not used: no transform %s -> %s: %s\n", waiting_.size(),
                    options_.node.base_frame.c_str(), frameName(waiting_.back().message.header.frame_id).c_str(),
@@ -136,6 +137,23 @@ class Replay {
     const std::string problem = odometryProblem();
     if (!options_.pipeline.scans_alone) throw std::runtime_error(arguments_.bag + ": " + problem);
     std::fprintf(stderr, "%s: the scans carry on alone\n", problem.c_str());
+  }
+
+  /// Of sensors that the parameters ask for, and that have said nothing: the robot goes on without.
+  void warnOfOthers() const {
+    const PipelineOptions& pipeline = options_.pipeline;
+    const auto warn = [this](const char* type, const std::string& topic, const char* parameter, const char* option) {
+      std::fprintf(stderr, "%s: no %s on %s, expected with %s: true; see %s: the estimate goes without\n",
+                   arguments_.bag.c_str(), type, topic.c_str(), parameter, option);
+    };
+    if (pipeline.imu.isUsed() && imus_ == 0) {
+      warn("sensor_msgs/Imu", arguments_.imu_topic, pipeline.imu.gyro ? "use_imu" : "use_imu_orientation",
+           "--imu-topic");
+    }
+    if (pipeline.pose_updates.on && given_poses_ == 0) {
+      warn("geometry_msgs/PoseWithCovarianceStamped", arguments_.pose_update_topic, "use_pose_updates",
+           "--pose-update-topic");
+    }
   }
 
   std::string odometryProblem() const {
@@ -214,6 +232,7 @@ class Replay {
 
   void addImu(const sensor_msgs::Imu& message) {
     if (!options_.pipeline.imu.isUsed()) return;
+    ++imus_;
     std::string problem;
     const auto mount = tf_.baseFrom(frameName(message.header.frame_id), &problem);
     const auto sample = mount ? toImuSample(message, *mount, options_.pipeline.imu, &problem) : std::nullopt;
@@ -226,6 +245,7 @@ class Replay {
 
   void addPose(const geometry_msgs::PoseWithCovarianceStamped& message) {
     if (!options_.pipeline.pose_updates.on) return;
+    ++given_poses_;
     std::string problem;
     if (const auto pose = toGivenPose(message, options_.node.map_frame, &problem)) {
       pipeline_.addPose({pose->stamp, {pose->odom_from_base, pose->covariance}});
@@ -282,6 +302,8 @@ class Replay {
   std::vector<std::size_t> scans_;  // that came, of each laser
   std::size_t odometry_ = 0;        // messages on the topic
   std::size_t odometry_used_ = 0;
+  std::size_t imus_ = 0;  // messages that the parameters ask for …
+  std::size_t given_poses_ = 0;
   std::size_t poses_ = 0;  // at the scans
   std::size_t map_poses_ = 0;
   std::string last_reason_;  // of a scan that was not used

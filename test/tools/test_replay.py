@@ -135,6 +135,22 @@ class ReplayTest(unittest.TestCase):
         self.assertGreater(len(true), 30)
         self.assertLess(np.abs(trajectory.poses[:, :2] - true[:, :2]).max(), 0.2)
 
+    def test_an_imu_or_poses_that_do_not_come_are_missed_aloud(self) -> None:
+        params = self.path("missed.yaml")
+        imu = "no sensor_msgs/Imu on /imu/data, expected with {}: true; see --imu-topic"
+        poses = "no geometry_msgs/PoseWithCovarianceStamped on /pose_update, expected with use_pose_updates: true"
+        for parameter, missed in (("use_imu", imu.format("use_imu")), ("use_pose_updates", poses),
+                                  ("use_imu_orientation", imu.format("use_imu_orientation"))):
+            params.write_text(f"{parameter}: true\n", encoding="utf-8")
+            done = self.run_replay(self.bag, "--csv", "/dev/null", "--params", params, "--imu-topic", "imu/data")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn(f"{self.bag}: {missed}", done.stderr)
+            self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
+        there = self.path("there.bag")
+        simulated_bag.write(str(there), duration=DURATION, imu=simulated_bag.ImuUnit(), poses=True)
+        params.write_text("use_imu: true\nuse_pose_updates: true\n", encoding="utf-8")
+        self.assertNotIn("expected with", self.run_replay(there, "--csv", "/dev/null", "--params", params).stderr)
+
     def test_the_trajectory_has_every_scan_and_is_right(self) -> None:
         scans = [stamp for topic, _, stamp in simulated_bag.messages(DURATION) if topic == "/scan"]
         trajectory = self.trajectory()
