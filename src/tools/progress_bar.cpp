@@ -20,6 +20,7 @@ void ProgressBar::advance() {
 
 void ProgressBar::finish() {
   if (shown_) std::fprintf(stderr, "\r%60s\r", "");
+  shown_ = false;
 }
 
 void ProgressBar::draw() const {

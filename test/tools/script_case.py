@@ -57,4 +57,5 @@ class ScriptCase(unittest.TestCase):
         done = self.run_script(*arguments)
         self.assertIn(done.returncode, (1, 2), done.stderr)
         self.assertRegex(done.stderr, rf"(?m)^{self.SCRIPT}: ")
+        self.assertNotRegex(done.stderr, r"Traceback|(?m:^replay: )|scans\.csv", "what the script runs is its own matter")
         return done.stderr

@@ -159,6 +159,11 @@ class BagTest(ScriptCase):
             self.assertIn(f"--params {other}: expected a parameter file (YAML): ", said)
             self.assertNotIn("Traceback", said)
 
+    def test_a_bad_parameter_is_that_of_the_file_that_was_given(self) -> None:
+        bad = self.params("gate_probability: 1.5\n")
+        self.assertIn(f"calibrate_odometry: parameter file {bad}: bad parameters:\n  gate_probability = 1.5: ",
+                      self.refused(self.path("drive.bag"), "--params", bad))
+
     def test_too_short_a_log_is_refused(self) -> None:
         done = self.run_script(self.path("short.bag"))
         self.assertEqual(done.returncode, 1)

@@ -9,6 +9,10 @@ namespace sckf {
 class ProgressBar {
  public:
   explicit ProgressBar(std::size_t total);
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+  ~ProgressBar() { finish(); }  // before anybody says what was wrong
+
   void advance();
   void finish();  ///< takes the bar away
 
