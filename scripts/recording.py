@@ -73,7 +73,7 @@ def _read_messages(path: str, topics: Topics) -> Dict[str, List[Tuple[Any, float
             for topic, message, time in bag.read_messages(wanted):
                 messages[topic].append((message, time.to_sec()))
     except (OSError, rosbag.ROSBagException) as error:
-        raise TrajectoryError(f"{path}: {error}") from error
+        raise TrajectoryError(f"{path}: expected a bag: {getattr(error, 'strerror', None) or error}") from error
     return messages
 
 

@@ -144,6 +144,24 @@ class BagTest(ScriptCase):
             self.assertTrue(all(abs(value) <= 1.0 for value in values), said)
         self.assertNotIn("windows", said)
 
+    def test_a_reference_that_goes_on_after_the_bag_is_used_as_far_as_the_bag_goes(self) -> None:
+        stamps = np.array([stamp for topic, _, stamp in simulated_bag.messages(80.0) if topic == "/scan"])
+        write_tum(self.path("longer.tum"), Trajectory(stamps, simulated_bag.true_trajectory(stamps)))
+        said = self.said(self.path("drive.bag"), "--reference", self.path("longer.tum"), "--length", "4", "--windows", "6")
+        self.assertRegex(said, r"(?m)^[2-4] windows of 4 m ")
+
+    def test_the_reference_of_another_time_is_told_with_both_times(self) -> None:
+        said = self.refused(self.path("drive.bag"), "--reference", self.path("later.tum"), "--length", "4")
+        self.assertRegex(said, r"later.tum: no window of 4 m .* from 15\d+\.\d+ to 15\d+\.\d+ s; expected the reference of "
+                               r".*drive.bag, 1000\.000 to 10\d+\.\d+ s")
+
+    def test_a_reference_is_read_before_the_bag(self) -> None:
+        empty = self.path("empty.tum")
+        Path(empty).touch()
+        done = self.run_script(self.path("drive.bag"), "--reference", empty)
+        self.assertEqual((done.returncode, done.stdout), (1, ""))
+        self.assertIn("empty.tum: 0 pose(s), a trajectory needs at least two", done.stderr)
+
     def test_wrong_input(self) -> None:
         drive, true = self.path("drive.bag"), self.path("true.tum")
         self.assertIn("/no/such.bag", self.refused("/no/such.bag"))
@@ -151,6 +169,7 @@ class BagTest(ScriptCase):
         self.assertRegex(self.refused(drive, "--reference", self.path("later.tum")), "later.tum: no window of 20 m")
         self.assertRegex(self.refused(drive, "--reference", true, "--length", "500"), "true.tum: no window of 500 m")
         self.assertIn("--length 0: expected more than 0 m", self.refused(drive, "--length", "0"))
+        self.assertIn("--length inf: expected more than 0 m, finite", self.refused(drive, "--length", "inf"))
         self.assertIn("--windows 0: expected 1 or more", self.refused(drive, "--windows", "0"))
         self.assertIn("--reference-std: expected 0 or more, finite: nan", self.refused(drive, "--reference-std", "nan", "0"))
 

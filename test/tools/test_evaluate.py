@@ -222,12 +222,21 @@ class CommandTest(unittest.TestCase):
     def test_bad_input_is_told_without_a_traceback(self) -> None:
         both = [str(self.reference), str(self.estimate)]
         for arguments in (["none.tum", str(self.estimate)], [*both, "--lengths=0"], [*both, "--point", "inf", "0"],
-                          [*both, "--max-gap", "nan"], [*both, "--max-gap", "-1"], [*both, "--max-gap", "soon"]):
+                          [*both, "--max-gap", "nan"], [*both, "--max-gap", "-1"], [*both, "--max-gap", "soon"],
+                          [*both, "--lengths", "far"], [*both, "--point", "here", "0"]):
             done = self.run_evaluate(*arguments)
             self.assertNotEqual(done.returncode, 0)
             self.assertNotIn("Traceback", done.stderr)
-            self.assertRegex(done.stderr, "none.tum: No such file|every length must be positive|a finite number of metres: inf|"
+            self.assertRegex(done.stderr, "none.tum: No such file|--lengths: expected lengths of more than 0 m, finite: 0|"
+                             "--lengths: expected lengths in metres, as 5,10,20: far|--point: expected a number of metres: here|"
+                             "--point: expected a finite number of metres: inf|"
                              "--max-gap: expected (0 or more, finite: (nan|-1)|a number: soon)")
+
+    def test_two_that_share_no_time_are_named(self) -> None:
+        write_tum(self.reference, Trajectory(circle().stamps + 1e4, circle().poses))
+        done = self.run_evaluate(str(self.reference), str(self.estimate))
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(f"evaluate: {self.estimate} against {self.reference}: the two trajectories share no time: ", done.stderr)
 
 
 @unittest.skipUnless(os.environ.get("SCKF_DATA"), "SCKF_DATA does not name the folder of recorded logs")

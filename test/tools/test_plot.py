@@ -215,8 +215,18 @@ class BagTest(unittest.TestCase):
         self.check_complaint("no wheel odometry on /wheels; see --odom-topic", "--odom-topic", "wheels")
         write_bag(self.bag, mount=False)
         self.check_complaint("TF does not lead from the scans' frame 'laser' to 'base_link'")
-        with self.assertRaisesRegex(TrajectoryError, "not appear to be a bag"):
+        with self.assertRaisesRegex(TrajectoryError, "expected a bag: .*not appear to be a bag"):
             read_recording(__file__)
+        with self.assertRaisesRegex(TrajectoryError, f"^{self.folder}: expected a bag: Is a directory$"):
+            read_recording(str(self.folder))
+
+    def test_the_estimate_of_another_time_is_told_with_all_times(self) -> None:
+        write_bag(self.bag)
+        other = self.folder / "other.tum"
+        other.write_text("1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n", encoding="utf-8")
+        self.check_complaint(f"{other}: odometry and estimate together cover 0 scan(s): expected an estimate of {self.bag}: the "
+                             "scans are from 1000000000.000 to 1000000013.800 s, the odometry from 1000000000.000 to "
+                             "1000000013.800 s, the estimate from 1.000 to 2.000 s", "--trajectory", str(other))
 
 
 if __name__ == "__main__":
