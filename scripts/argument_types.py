@@ -35,6 +35,19 @@ def not_negative(text: str) -> float:
     return value
 
 
+def within(least: float, most: float) -> Callable[[str], float]:
+    """A number of a range."""
+    def parse(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f"expected {least:g} to {most:g}: {text}")
+        return value
+    return parse
+
+
 def whole(least: int, most: Optional[int] = None) -> Callable[[str], int]:
     """A whole number of a range."""
     expected = f"a whole number, {least} or more" if most is None else f"a whole number, {least} to {most}"

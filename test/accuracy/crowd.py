@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
-import rosbag
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
+from commands import command, rewritten  # noqa: E402
+from trajectory import TrajectoryError  # noqa: E402
 
 TIMES = 12  # in the whole log
 SHARE = 0.06  # of the scans
@@ -18,8 +22,11 @@ NOISE = 0.02  # [m] of a range
 def crowd(bag: Path, output: Path, topic: str = "/scan") -> None:
     """In each crowd, people are somewhere else at every scan."""
     draws = np.random.default_rng(5)
-    with rosbag.Bag(str(bag)) as source, rosbag.Bag(str(output), "w") as out:
-        period = source.get_message_count(topic) // TIMES
+    with rewritten(bag, output) as (source, out):
+        scans = source.get_message_count(topic)
+        if scans < TIMES:
+            raise TrajectoryError(f"{bag}: {scans} scans on {topic}: expected {TIMES} or more")
+        period = scans // TIMES
         crowded = max(1, round(SHARE * period))
         count = 0
         for name, message, time in source.read_messages():
@@ -32,9 +39,13 @@ def crowd(bag: Path, output: Path, topic: str = "/scan") -> None:
             out.write(name, message, time)
 
 
-if __name__ == "__main__":
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     for argument in ("bag", "output_bag"):
         parser.add_argument(argument, type=Path)
     options = parser.parse_args()
     crowd(options.bag, options.output_bag)
+
+
+if __name__ == "__main__":
+    command(main)

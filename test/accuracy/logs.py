@@ -7,12 +7,15 @@ skipped. SCKF_BIN_DIR is the folder of the programs under test.
 from __future__ import annotations
 
 import os
-import subprocess
+import sys
 import unittest
 from pathlib import Path
 from typing import Tuple
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "scripts"))
+from programs import run_program  # noqa: E402
+
 BIN_DIR = Path(os.environ.get("SCKF_BIN_DIR", ROOT / "build" / "devel" / "lib" / "sckf_odometry"))
 DATASETS = Path("/usr/share/mrpt/datasets")
 SIMULATED = DATASETS / "graphslam-engine-demos" / "action_observations_map"
@@ -20,10 +23,7 @@ MALAGA = DATASETS / "2006-01ENE-21-SENA_Telecom Faculty_one_loop_only.rawlog"
 
 
 def run(program: str, *arguments: str | Path) -> None:
-    done = subprocess.run([str(BIN_DIR / program), *map(str, arguments)], stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT, text=True, check=False)
-    if done.returncode != 0:
-        raise RuntimeError(f"{program} ended with {done.returncode}: {done.stdout}")
+    run_program(program, arguments, BIN_DIR)
 
 
 def recorded(name: str) -> Path:

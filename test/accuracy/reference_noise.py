@@ -21,9 +21,11 @@ from typing import List, Sequence
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
+from commands import command  # noqa: E402
 from logs import run  # noqa: E402
 from thinned import thin  # noqa: E402
-from trajectory import DEFAULT_LENGTHS, DEFAULT_MAX_GAP, Trajectory, between, read_tum, sample  # noqa: E402
+from trajectory import (DEFAULT_LENGTHS, DEFAULT_MAX_GAP, Trajectory, TrajectoryError, between, read_tum,  # noqa: E402
+                        sample)
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,8 @@ def shares(reference: Trajectory, estimates: Sequence[Trajectory]) -> List[Share
         start = np.flatnonzero(end < len(reference.way))
         end = end[start]
         counts = covered[start] & covered[end]
+        if not counts.any():
+            continue
         moved = [between(each[start[counts]], each[end[counts]]) for each in poses]
 
         def mean_squares(a: int, b: int, moved=moved, length=length) -> np.ndarray:
@@ -66,6 +70,10 @@ def shares(reference: Trajectory, estimates: Sequence[Trajectory]) -> List[Share
 
         first, second, apart = mean_squares(0, 1), mean_squares(0, 2), mean_squares(1, 2)
         result.append(Share(length, rms(first), rms(apart), rms(0.5 * (first + second - apart))))
+    if not result:
+        times = ", ".join(f"{each.stamps[0]:.3f} to {each.stamps[-1]:.3f} s" for each in (reference, *estimates))
+        raise TrajectoryError(f"no segment of {DEFAULT_LENGTHS[0]:g} m or more that the reference and both estimates cover: they "
+                              f"are from {times}")
     return result
 
 
@@ -77,20 +85,22 @@ def replayed(bag: Path) -> Trajectory:
 
 
 def by_halves(bag: Path, tum: Path) -> List[Share]:
+    reference = read_tum(tum)
     halves = []
     with tempfile.TemporaryDirectory() as folder:
         half = Path(folder) / "half.bag"
         for first in (0, 1):
             thin(bag, half, 2, first)
             halves.append(replayed(half))
-    return shares(read_tum(tum), halves)
+    return shares(reference, halves)
 
 
 def by_another(bag: Path, tum: Path, other: Path) -> List[Share]:
-    return shares(read_tum(tum), [replayed(bag), read_tum(other)])
+    reference, of_other = read_tum(tum), read_tum(other)
+    return shares(reference, [replayed(bag), of_other])
 
 
-if __name__ == "__main__":
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for argument in ("bag", "reference"):
         parser.add_argument(argument, type=Path)
@@ -102,3 +112,7 @@ if __name__ == "__main__":
     for share in table:
         cells = [f"{each.percent:.2f} %, {each.deg_per_m:.3f} °/m" for each in (share.first, share.estimates, share.reference)]
         print(f"{share.length:6g} m" + "".join(f"{cell:>26}" for cell in cells))
+
+
+if __name__ == "__main__":
+    command(main)

@@ -14,11 +14,12 @@ from pathlib import Path
 from typing import Callable, Dict, List, Optional
 
 import numpy as np
-import rosbag
 import rospy
 from sensor_msgs.msg import LaserScan
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "ros"), str(Path(__file__).resolve().parents[2] / "scripts")]
+from argument_types import whole, within  # noqa: E402
+from commands import command, written  # noqa: E402
 from simulated_bag import Mount, cast, mount_message, odometry_message  # noqa: E402
 from simulated_places import PLACES, Place, disc  # noqa: E402
 from trajectory import Trajectory, between, compose, write_tum  # noqa: E402
@@ -153,7 +154,7 @@ def simulate(place_name: str, bag: Path, tum: Path, wheels: str = "good", step: 
     odometry = told_by(WHEELS[wheels], poses, draws)
     strollers = draws.uniform(place.way.min(axis=0) - 3.0, place.way.max(axis=0) + 3.0, (place.strollers, 2))
     walker = Somebody(somebody, truth)
-    with rosbag.Bag(str(bag), "w") as out:
+    with written(bag) as out:
         begin = rospy.Time.from_sec(START)
         out.write("/tf_static", mount_message(begin, MOUNT), begin)
         for k, (stamp, pose) in enumerate(zip(truth.stamps, poses)):
@@ -177,11 +178,11 @@ def main() -> None:
     parser.add_argument("output_bag", type=Path)
     parser.add_argument("output_tum", type=Path)
     parser.add_argument("--wheels", choices=sorted(WHEELS), default="good")
-    parser.add_argument("--step", type=float, default=0.5, help="from scan to scan [m] (default: 0.5)")
-    parser.add_argument("--beams", type=int, default=181, help="of the laser, over half a turn (default: 181)")
-    parser.add_argument("--reach", type=float, default=80.0, help="of the laser [m] (default: 80)")
+    parser.add_argument("--step", type=within(0.01, 10.0), default=0.5, help="from scan to scan [m] (default: 0.5)")
+    parser.add_argument("--beams", type=whole(2, 100000), default=181, help="of the laser, over half a turn (default: 181)")
+    parser.add_argument("--reach", type=within(0.1, 1000.0), default=80.0, help="of the laser [m] (default: 80)")
     parser.add_argument("--somebody", choices=("ahead", "towards"), help="walks along the robot's way")
-    parser.add_argument("--seed", type=int, default=SEED,
+    parser.add_argument("--seed", type=whole(0), default=SEED,
                         help="of all that is drawn: where doors, trees and pictures are, noise (default: %(default)s)")
     options = parser.parse_args()
     simulate(options.place, options.output_bag, options.output_tum, options.wheels, options.step,
@@ -189,4 +190,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command(main)

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Callable
 
 import numpy as np
-import rosbag
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
-from trajectory import between, compose  # noqa: E402
+from commands import command, rewritten  # noqa: E402
+from trajectory import TrajectoryError, between, compose  # noqa: E402
 
 Told = Callable[[np.ndarray], np.ndarray]  # of the steps of the odometry (n x 3: x, y [m], yaw [rad]), what is told
 SLIPS = 1 / 8  # of the steps in motion
@@ -59,10 +59,10 @@ def worsen(path: str, output: str, told: Told, topic: str = "/odom") -> None:
         position, q = message.pose.pose.position, message.pose.pose.orientation
         return np.array([position.x, position.y, 2.0 * math.atan2(q.z, q.w)])
 
-    with rosbag.Bag(path) as source, rosbag.Bag(output, "w") as out:
+    with rewritten(Path(path), Path(output)) as (source, out):
         poses = np.array([pose(message) for _, message, _ in source.read_messages(topics=[topic])])
         if len(poses) == 0:
-            raise SystemExit(f"{path}: no odometry on {topic}")
+            raise TrajectoryError(f"{path}: no odometry on {topic}")
         steps = iter(told(between(poses[:-1], poses[1:])))
         now = poses[0]
         for name, message, stamp in source.read_messages():
@@ -73,10 +73,14 @@ def worsen(path: str, output: str, told: Told, topic: str = "/odom") -> None:
             out.write(name, message, stamp)
 
 
-if __name__ == "__main__":
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("bag")
     parser.add_argument("output")
     parser.add_argument("wheels", choices=("slipping", "freezing"))
     options = parser.parse_args()
     worsen(options.bag, options.output, {"slipping": slipping, "freezing": freezing}[options.wheels])
+
+
+if __name__ == "__main__":
+    command(main)
