@@ -14,6 +14,7 @@ from typing import Any
 
 import rosbag
 import roslaunch.config
+import roslaunch.core
 import roslaunch.xmlloader
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -44,6 +45,12 @@ class LaunchTest(unittest.TestCase):
             parameters = load("replay.launch", "bag:=some.bag", "rate:=10", f"name:={name}").params
             self.assertEqual(parameters[f"/{name}/max_scan_delay"].value, 50.0)
             self.assertEqual({key.split("/")[1] for key in parameters}, {name, "use_sim_time"})
+
+    def test_a_rate_that_is_no_number_is_told_by_roslaunch(self) -> None:
+        with self.assertRaisesRegex(roslaunch.core.RLException, r"(?s)could not convert string to float: 'foo'.*float\(rate\)"):
+            load("replay.launch", "bag:=some.bag", "rate:=foo")
+        parameters = load("replay.launch", "bag:=some.bag", "rate:=1e1").params  # as rosbag takes it, too
+        self.assertEqual(parameters["/sckf_odometry/max_scan_delay"].value, 50.0)
 
     def test_the_demo_plays_a_log_records_it_and_ends(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
