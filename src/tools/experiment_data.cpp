@@ -186,9 +186,11 @@ boost::program_options::options_description optionsFor(Arguments& a) {
   NumberOptions stereo("visual_odometry");
   stereo("pixel-std", a.visual_odometry.pixel_std, {0.0, 10.0, kAbove}, "std of a pixel coordinate")
     ("features", a.visual_odometry.features, {0.0, 10.0, kAbove}, "per cubic metre")
-    ("far", a.visual_odometry.camera.far, {a.visual_odometry.camera.near, 50.0, kAbove, " m"}, "depth of the farthest features [m]");
+    ("far", a.visual_odometry.camera.far, {a.visual_odometry.camera.near, 50.0, kAbove, " m"},
+     "depth of the farthest features [m]");
   NumberOptions sweeps("deskewing");
-  sweeps("sweep", a.deskewing.sweep, {0.0, 1.0 / a.deskewing.run.scan_rate, !kAbove, " s"}, "from the first beam of a scan to the last [s]");
+  sweeps("sweep", a.deskewing.sweep, {0.0, 1.0 / a.deskewing.run.scan_rate, !kAbove, " s"},
+         "from the first beam of a scan to the last [s]");
   NumberOptions clouds("cloud_input");
   clouds("rings", a.cloud_input.rings, {2, 128}, "of the lidar")
     ("pitch", a.cloud_input.pitch, {-1.0, 1.0, !kAbove, " rad"}, "of the lidar, forward [rad]");
