@@ -197,7 +197,7 @@ def absolute_poses(setting: Setting) -> Result:
             knew nothing before; rms errors at the end, and NEES as the mean over the way (3 is right). Where scans tell
             the motion better the poses only say where the whole is. With them, all other sensors of this section and
             wheels that err: NEES {n['every_sensor_nees']:.2f}, of the calibration
-            {n['every_sensor_calibration_nees']:.2f} (4 is right), of the gyro's bias
+            {n['every_sensor_calibration_nees']:.2f} (6 is right), of the gyro's bias
             {n['every_sensor_bias_nees']:.2f} (1 is right)."""),
         markdown_table(["", "position", "yaw", "NEES"], [
             [label, f"{100 * n[f'{name}_position']:.1f} cm", f"{math.degrees(n[f'{name}_yaw']):.2f}°",
@@ -266,9 +266,10 @@ def calibration(setting: Setting) -> Result:
     result.text = [
         paragraph(f"""
             Robots whose wheels err by 10 % (std) of the way, 10 % of rotations and 0.1 rad/m, whose laser is 10 cm
-            farther ahead or behind, and all of it forgotten within 20 m: 8 s in a hall, then 8 s blind. The scale of the way is known to {100 * n['scale_at_first']:.1f} %
+            farther ahead or behind, on a floor that takes them along by 5 % of the way to each side, and all of it
+            forgotten within 20 m: 8 s in a hall, then 8 s blind. The scale of the way is known to {100 * n['scale_at_first']:.1f} %
             after the first scan and to {100 * n['scale']:.1f} % (rms) before the robot is blind, where 10 % would be
-            not to know it; NEES of the four errors {n['scale_nees']:.2f} (4 is right). At the end, after the blind
+            not to know it; NEES of the six errors {n['scale_nees']:.2f} (6 is right). At the end, after the blind
             stretch:"""),
         markdown_table(["", "position", "yaw", "NEES"], [
             [label, f"{100 * n[f'{name}_position']:.1f} cm", f"{math.degrees(n[f'{name}_yaw']):.2f}°",

@@ -26,11 +26,11 @@ constexpr double kNoBound = std::numeric_limits<double>::infinity();
 const Eigen::RowVector3d kYaw(0.0, 0.0, 1.0);
 
 /// A column of the identity for each element that is not zero.
-Eigen::Matrix4Xd columnsOf(const Eigen::Vector4d& v) {
-  Eigen::Matrix4Xd columns(4, (v.array() != 0.0).count());
+WheelCalibration::Columns columnsOf(const WheelCalibration::Vector& v) {
+  WheelCalibration::Columns columns(v.size(), (v.array() != 0.0).count());
   Eigen::Index column = 0;
-  for (Eigen::Index i = 0; i < 4; ++i) {
-    if (v(i) != 0.0) columns.col(column++) = Eigen::Vector4d::Unit(i);
+  for (Eigen::Index i = 0; i < v.size(); ++i) {
+    if (v(i) != 0.0) columns.col(column++) = WheelCalibration::Vector::Unit(i);
   }
   return columns;
 }
@@ -196,6 +196,7 @@ void MultiCloneFilter::enterWorld(const PoseMeasurement& world_from_base) {
   enter(pose_, pose_error_);
   for (Clone& clone : clones_) enter(clone.pose, clone.error);
   for (Landmark& landmark : landmarks_) enter(landmark.pose, landmark.error);
+  turnCalibration(d.yaw);
   compass_from_world_ -= d.yaw;
   if (compass_error_) errors_.move(*compass_error_, -kYaw, unknown);
   errors_.remove(unknown);

@@ -23,15 +23,6 @@ void allowForSlip(const MotionMeasurement& z, const Innovation::Vector& r, const
   if (r.size() == 1 && r(0) * r(0) > kContradiction * S(0, 0)) Q += z.seen.transpose() * r * r.transpose() * z.seen;
 }
 
-/// ∂u/∂(s, r, k, l)
-WheelCalibration::Jacobian byWheelCalibration(const SE2& u) {
-  WheelCalibration::Jacobian B = WheelCalibration::Jacobian::Zero();
-  B.topLeftCorner<2, 1>() = u.translation();
-  B.block<1, 2>(2, 1) << u.yaw, u.x;
-  B.topRightCorner<2, 1>() << std::cos(u.yaw) - 1.0, std::sin(u.yaw);
-  return B;
-}
-
 }  // namespace
 
 Eigen::MatrixXd MultiCloneFilter::calibrationCovarianceAtFirst() const {
@@ -48,27 +39,40 @@ void MultiCloneFilter::beginCalibration(const std::optional<WheelCalibration>& k
 }
 
 /// By those that are estimated.
-Eigen::Matrix3Xd MultiCloneFilter::byCalibration(const SE2& u) const { return byWheelCalibration(u) * calibrated_; }
+Eigen::Matrix3Xd MultiCloneFilter::byCalibration(const SE2& motion, double yaw) const {
+  return WheelCalibration::jacobian(motion, yaw) * calibrated_;
+}
 
-OdometryIncrement MultiCloneFilter::calibrated(const OdometryIncrement& increment) const {
+OdometryIncrement MultiCloneFilter::calibrated(const OdometryIncrement& increment, double yaw) const {
   OdometryIncrement motion = increment;
   if (!increment.by_wheels) return motion;
   const SE2& u = increment.before_from_after;
-  motion.before_from_after = corrected(u, byWheelCalibration(u) * calibration_);
+  motion.before_from_after = corrected(u, WheelCalibration::jacobian(u, yaw) * calibration_);
   return motion;
 }
 
+void MultiCloneFilter::turnCalibration(double yaw) {
+  if (!calibration_error_) return;
+  const WheelCalibration::Matrix R = WheelCalibration::turn(yaw);
+  calibration_ = R * calibration_;
+  const WheelCalibration::Matrix moved = R - WheelCalibration::Matrix::Identity();
+  errors_.move(*calibration_error_, calibrated_.transpose() * moved * calibrated_, *calibration_error_);
+}
+
 void MultiCloneFilter::propagate(const OdometryIncrement& increment) {
-  const OdometryIncrement motion = calibrated(increment);
+  const double yaw_before = pose_.yaw;
+  const OdometryIncrement motion = calibrated(increment, yaw_before);
   Matrix3d G;
   pose_ = compose(pose_, motion.before_from_after, nullptr, &G);  // (8)
   const Matrix3d W = inverseOfAdditive(pose_) * G;
   const bool calibrates = calibration_error_ && increment.by_wheels;
-  if (calibrates) errors_.move(pose_error_, W * byCalibration(increment.before_from_after), *calibration_error_);
+  if (calibrates) {
+    errors_.move(pose_error_, W * byCalibration(increment.before_from_after, yaw_before), *calibration_error_);
+  }
   if (increment.measured.empty()) {
     errors_.disturb(pose_error_, W * increment.covariance * W.transpose());  // (9)-(14)
   } else {
-    measureMotion(increment, W);
+    measureMotion(increment, yaw_before, W);
   }
   if (calibrates) {
     constexpr double kLongest = 0.05;  // of the way after which the calibration may be another one, without a reference
@@ -79,9 +83,9 @@ void MultiCloneFilter::propagate(const OdometryIncrement& increment) {
 }
 
 /// The wheels' noise is a part of the state while others tell of the motion.
-void MultiCloneFilter::measureMotion(const OdometryIncrement& increment, const Matrix3d& W) {
+void MultiCloneFilter::measureMotion(const OdometryIncrement& increment, double yaw, const Matrix3d& W) {
   WheelCalibration::Jacobian B = WheelCalibration::Jacobian::Zero();
-  if (increment.by_wheels) B = byWheelCalibration(increment.before_from_after);
+  if (increment.by_wheels) B = WheelCalibration::jacobian(increment.before_from_after, yaw);
   const Vector3d u = increment.before_from_after.vector();
   const auto expected = [&](const Vector3d& noise) -> Vector3d { return u + B * calibration_ + noise; };
   const auto measurement = [&](const MotionMeasurement& z, const Vector3d& noise, const std::optional<Part>& part) {
@@ -114,11 +118,11 @@ void MultiCloneFilter::measureMotion(const OdometryIncrement& increment, const M
   errors_.remove(noise_error);
 }
 
-OdometryIncrement MultiCloneFilter::refined(const OdometryIncrement& increment) const {
-  OdometryIncrement motion = calibrated(increment);
+OdometryIncrement MultiCloneFilter::refined(const OdometryIncrement& increment, double yaw) const {
+  OdometryIncrement motion = calibrated(increment, yaw);
   Matrix3d& Q = motion.covariance;
   if (calibration_error_ && increment.by_wheels) {
-    const Eigen::Matrix3Xd B = byCalibration(increment.before_from_after);
+    const Eigen::Matrix3Xd B = byCalibration(increment.before_from_after, yaw);
     Q += symmetric(B * errors_.covariance(*calibration_error_) * B.transpose());
   }
   for (const MotionMeasurement& z : increment.measured) {

@@ -32,7 +32,7 @@ class Robot {
         random_(seed),
         room_(sensors.walls, 0.03),
         filter_(corrected(truth_, random_.drawnFrom(kStart)), kStart, estimated(sensors)) {
-    calibration_ = sensors.states.calibration_std.cwiseProduct(Eigen::Vector4d(random_.gaussian(4)));
+    calibration_ = sensors.states.calibration_std.cwiseProduct(WheelCalibration::Vector(random_.gaussian(WheelCalibration::kErrors)));
     bias_ = sensors.states.gyro_bias_std * random_.gaussian();
     compass_from_world_ = random_.uniform(-3.0, 3.0);
     references_.push_back(room_.scan(truth_, random_));
@@ -92,8 +92,9 @@ class Robot {
     const OdometryIncrement increment = modelledIncrement(by_wheels, simulatedWheelNoise());
     const auto& [s, r, k, l] = std::tie(calibration_(0), calibration_(1), calibration_(2), calibration_(3));
     const auto& [x, y, yaw] = by_wheels;
-    truth = corrected(SE2((1.0 + s) * x - l * (1.0 - std::cos(yaw)), (1.0 + s) * y + l * std::sin(yaw),
-                          (1.0 + r) * yaw + k * std::hypot(x, y)),
+    const Eigen::Vector2d along = std::hypot(x, y) * (truth_.rotation().transpose() * calibration_.tail<2>());
+    truth = corrected(SE2((1.0 + s) * x - l * (1.0 - std::cos(yaw)) + along.x(),
+                          (1.0 + s) * y + l * std::sin(yaw) + along.y(), (1.0 + r) * yaw + k * std::hypot(x, y)),
                       random_.drawnFrom(increment.covariance));
     return increment;
   }
@@ -106,8 +107,8 @@ class Robot {
 
   void drift(double way) {
     const double kept = std::exp(-way / sensors_.states.calibration_way);
-    const Eigen::Vector4d std = std::sqrt(1.0 - kept * kept) * sensors_.states.calibration_std;
-    calibration_ = kept * calibration_ + std.cwiseProduct(Eigen::Vector4d(random_.gaussian(4)));
+    const WheelCalibration::Vector std = std::sqrt(1.0 - kept * kept) * sensors_.states.calibration_std;
+    calibration_ = kept * calibration_ + std.cwiseProduct(WheelCalibration::Vector(random_.gaussian(WheelCalibration::kErrors)));
     bias_ += std::sqrt(kDt) * sensors_.states.gyro_bias_drift * random_.gaussian();
     compass_from_world_ += std::sqrt(kDt) * sensors_.states.heading_drift * random_.gaussian();
   }
@@ -172,7 +173,7 @@ class Robot {
   RoomSimulation room_;
   SE2 truth_{0.0, -1.0, 0.0};
   MultiCloneFilter filter_;
-  Eigen::Vector4d calibration_;
+  WheelCalibration::Vector calibration_;
   double bias_ = 0.0;
   double compass_from_world_ = 0.0;
   SE2 world_from_room_;
@@ -193,7 +194,7 @@ OdometryNoise simulatedWheelNoise() {
 
 SimulatedSensors wheelsThatErr() {
   SimulatedSensors sensors;
-  sensors.states.calibration_std = Eigen::Vector4d(0.1, 0.1, 0.1, 0.1);
+  sensors.states.calibration_std << 0.1, 0.1, 0.1, 0.1, 0.05, 0.05;
   sensors.states.calibration_way = 20.0;
   return sensors;
 }

@@ -5,7 +5,7 @@ namespace sckf {
 StateOptions statesFor(const CalibrationOptions& calibration, const ImuOptions& imu) {
   StateOptions states;
   states.calibration_std << calibration.distance_std, calibration.rotation_std, calibration.rotation_per_meter_std,
-      calibration.laser_ahead_std;
+      calibration.laser_ahead_std, calibration.floor_std, calibration.floor_std;
   states.calibration_way = calibration.way;
   if (imu.gyro) {
     states.gyro_bias_std = imu.gyro_bias_std;

@@ -265,6 +265,9 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
   StateOptions states = statesFor(options_.calibration, options_.imu);
   before_ = found();
   states.known_calibration = before_.calibration;
+  if (filter_ && before_.calibration) {  // what is told in x and y of the world
+    states.known_calibration = before_.calibration->turned(odom_from_base.yaw - filter_->pose().yaw);
+  }
   states.known_gyro_bias = before_.gyro_bias;
   const Eigen::Matrix3d P = withYawUpToATurn(symmetric(covariance));
   map_ = nullptr;
@@ -292,7 +295,7 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
 
 Found ScanOdometry::found() const {
   Found found = before_;
-  if (filter_ && filter_->calibration().covariance != Eigen::Matrix4d::Zero())
+  if (filter_ && filter_->calibration().covariance != WheelCalibration::Matrix::Zero())
     found.calibration = filter_->calibration();
   if (filter_ && filter_->gyroBias().variance > 0.0) found.gyro_bias = filter_->gyroBias();
   found.lasers.clear();

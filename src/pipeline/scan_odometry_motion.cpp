@@ -18,9 +18,11 @@ constexpr std::size_t kConfirmations = 3;
 ScanMotion ScanOdometry::motionDuring(const WaitingScans::Entry& waiting) const {
   ScanMotion motion;
   Standstill standstill = standstill_;
+  SE2 at = filter_->pose();
   for (const OdometryBuffer::Step& step : odometry_.steps(waiting.scan.stamp, waiting.end())) {
-    motion.add(filter_->refined(increment(step, standstill)).before_from_after,
-               seconds(step.to.stamp - step.from.stamp));
+    const SE2 moved = filter_->refined(increment(step, standstill), at.yaw).before_from_after;
+    motion.add(moved, seconds(step.to.stamp - step.from.stamp));
+    at = compose(at, moved);
   }
   return motion;
 }
@@ -52,7 +54,7 @@ void ScanOdometry::propagateTo(Stamp stamp) {
   for (const OdometryBuffer::Step& step : odometry_.steps(filter_stamp_, stamp)) {
     const OdometryIncrement motion = increment(step, standstill_);
     const double dt = seconds(step.to.stamp - step.from.stamp);
-    filter_twist_.add(filter_->refined(motion), dt);
+    filter_twist_.add(filter_->refined(motion, filter_->pose().yaw), dt);
     filter_->propagate(motion);
     filter_->age(dt);
     filter_stamp_ = step.to.stamp;
@@ -89,7 +91,8 @@ void ScanOdometry::carryOn() {
   }
   const auto carry = [this](CarriedOn& carried, Stamp to) {
     for (const OdometryBuffer::Step& step : odometry_.steps(carried.stamp, to)) {
-      carried.estimate.propagate(filter_->refined(increment(step, carried.standstill)));
+      carried.estimate.propagate(
+          filter_->refined(increment(step, carried.standstill), carried.estimate.pose().yaw));
     }
     carried.stamp = to;
   };
@@ -124,9 +127,10 @@ bool ScanOdometry::bridgeToOldestWaiting() {
 }
 
 void ScanOdometry::followWheels(Stamp since) {
+  const double yaw = latest_ ? latest_->estimate.pose().yaw : start_.yaw;
   for (const OdometryBuffer::Step& step : odometry_.steps(since, odometry_.newest())) {
     if (step.guess) continue;
-    twist_.add(filter_->refined(byWheels(step)), seconds(step.to.stamp - step.from.stamp));
+    twist_.add(filter_->refined(byWheels(step), yaw), seconds(step.to.stamp - step.from.stamp));
     motion_known_ = step.to.stamp;
   }
 }

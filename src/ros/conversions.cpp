@@ -297,7 +297,7 @@ sckf_odometry::Status toStatus(const ScanReport& report, const std::string& meth
     status.nis_bound = report.nis_bound;
   }
   if (report.reference_stamp != Stamp(0)) status.reference_age = seconds(report.stamp - report.reference_stamp);
-  const Eigen::Vector4d calibration_std = report.calibration.covariance.diagonal().cwiseSqrt();
+  const WheelCalibration::Vector calibration_std = report.calibration.covariance.diagonal().cwiseSqrt();
   const auto& [range_offset, sweep_duration] = report.laser_constants;
   status.range_offset = range_offset.value();
   status.range_offset_std = std::sqrt(range_offset.variance());
@@ -311,6 +311,10 @@ sckf_odometry::Status toStatus(const ScanReport& report, const std::string& meth
   status.calibration_rotation_per_meter_std = calibration_std(2);
   status.calibration_laser_ahead = report.calibration.error(3);
   status.calibration_laser_ahead_std = calibration_std(3);
+  status.calibration_floor_x = report.calibration.error(4);
+  status.calibration_floor_x_std = calibration_std(4);
+  status.calibration_floor_y = report.calibration.error(5);
+  status.calibration_floor_y_std = calibration_std(5);
   status.gyro_bias = report.gyro_bias.value;
   status.gyro_bias_std = std::sqrt(report.gyro_bias.variance);
   status.gyro_time = report.gyro_time;

@@ -272,9 +272,10 @@ void Health::addPoseUpdates(const ros::Time& now, StatusWrapper& status) {
 }
 
 void Health::addCalibration(StatusWrapper& status) const {
-  const Eigen::Vector4d std = calibration_.covariance.diagonal().cwiseSqrt();
-  const char* const of[] = {"way [1]", "rotation [1]", "rotation per meter [rad/m]", "laser ahead [m]"};
-  for (Eigen::Index i = 0; i < 4; ++i) {
+  const WheelCalibration::Vector std = calibration_.covariance.diagonal().cwiseSqrt();
+  const char* const of[] = {"way [1]",         "rotation [1]",  "rotation per meter [rad/m]",
+                            "laser ahead [m]", "floor x [m/m]", "floor y [m/m]"};
+  for (Eigen::Index i = 0; i < WheelCalibration::kErrors; ++i) {
     if (std(i) == 0.0) continue;
     status.addf(std::string("error of the wheels: ") + of[i], "%.4f +- %.4f", calibration_.error(i), std(i));
   }

@@ -102,6 +102,7 @@ List otherSensors(PipelineOptions& pipeline) {
       number("calibration_rotation_std", calibration.rotation_std, within(0.0, 1.0)),
       number("calibration_rotation_per_meter_std", calibration.rotation_per_meter_std, within(0.0, 1.0), "rad/m"),
       number("calibration_laser_ahead_std", calibration.laser_ahead_std, within(0.0, 1.0), "m"),
+      number("calibration_floor_std", calibration.floor_std, within(0.0, 1.0), "m/m"),
       number("calibration_way", calibration.way, within(0.1, 1e6), "m"),
       flag("use_pose_updates", pipeline.pose_updates.on),
       number("pose_update_max_rejected", pipeline.pose_updates.max_rejected, within(1, 1e6), "poses"),

@@ -11,7 +11,7 @@ import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Callable, Dict, List, Optional
+from typing import Callable, Dict, List, Optional, Tuple
 
 import numpy as np
 import rospy
@@ -40,12 +40,14 @@ class Wheels:
     pull: float = 0.0  # [rad/m] told too much
     noise: float = 0.01  # of the way
     yaw_noise: float = 0.002  # [rad/√m]
+    pile: Tuple[float, float] = (0.0, 0.0)  # [1] of a carpet: so far it takes the robot along, in the world, per metre
     worse: Optional[Callable[[np.ndarray], np.ndarray]] = None  # of what they would tell of the steps, what they do
 
 
 WHEELS: Dict[str, Wheels] = {
     "good": Wheels(),
     "drifting": Wheels(1.05, 1.03, math.radians(2.0), 0.03, 0.01),
+    "carpet": Wheels(pile=(0.013, 0.009)),
     "slipping": Wheels(worse=slipping),
     "freezing": Wheels(worse=freezing),
 }
@@ -90,6 +92,8 @@ def told_by(wheels: Wheels, poses: np.ndarray, draws: np.random.Generator) -> np
     yaw_std = wheels.yaw_noise * np.sqrt(way) + 0.01 * abs(steps[:, 2])
     noise = draws.normal(size=steps.shape) * np.column_stack((wheels.noise * way, 0.3 * wheels.noise * way, yaw_std))
     drift = np.column_stack((np.zeros((len(steps), 2)), wheels.pull * way))
+    headings = poses[:-1] * np.array([0.0, 0.0, 1.0])
+    steps[:, :2] -= between(headings, np.outer(way, (*wheels.pile, 0.0)))[:, :2]
     steps = steps * np.array([wheels.way, wheels.way, wheels.rotation]) + drift + noise
     told = [np.zeros(3)]
     for step in wheels.worse(steps) if wheels.worse else steps:

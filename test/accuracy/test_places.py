@@ -58,6 +58,13 @@ class PlacesTest(unittest.TestCase):
     def test_a_corridor_with_doors_whose_way_the_wheels_tell_wrong(self) -> None:
         self.check("corridor", "drifting", 0.6, 0.007, 30.0)
 
+    def test_a_corridor_on_whose_carpet_the_robot_is_taken_along(self) -> None:
+        estimate = self.check("corridor", "carpet", 0.5, 0.007, 1.0)
+        (self.folder / "smooth.yaml").write_text("calibration_floor_std: 0\n", encoding="utf-8")
+        smooth = self.drifted("--params", self.folder / "smooth.yaml").translation_percent
+        print(f"if it were a smooth floor {smooth:.2f} %")
+        self.assertLess(estimate, 0.8 * smooth)
+
     def test_a_hotel_whose_doors_are_one_as_the_other(self) -> None:
         self.check("hotel", "slipping", 0.19, 0.005, 12.0)
 

@@ -21,7 +21,7 @@ SensorStatistics simulate(const SimulatedSensors& sensors) { return simulateOthe
 /// At the origin, with what the pipeline estimates of wheels and laser by default.
 MultiCloneFilter withWheelsThatMayErr() {
   StateOptions states;
-  states.calibration_std << 0.02, 0.05, 0.05, 0.1;
+  states.calibration_std << 0.02, 0.05, 0.05, 0.1, 0.01, 0.01;
   states.calibration_way = 1000.0;
   return MultiCloneFilter(SE2(), Eigen::Matrix3d::Zero(), states);
 }
@@ -33,7 +33,7 @@ void expectInBand(const std::vector<double>& means, int d, const std::string& wh
 TEST(OtherMeasurements, SystematicErrorsOfTheWheelsAreFound) {
   const SensorStatistics with = simulate(wheelsThatErr());
   expectInBand(with.pose, 3, "pose");
-  expectInBand(with.calibration, 4, "calibration");
+  expectInBand(with.calibration, WheelCalibration::kErrors, "calibration");
   EXPECT_LT(std::sqrt(with.squared_calibration.back()), 0.5 * 0.1) << "scale of distance, 0.1 if it were not found";
 }
 
@@ -42,7 +42,7 @@ TEST(OtherMeasurements, AlongACorridorTheCalibrationIsAllThereIs) {
   sensors.walls = simulatedCorridor();
   const SensorStatistics with = simulate(sensors);
   expectInBand(with.pose, 3, "pose");
-  expectInBand(with.calibration, 4, "calibration");
+  expectInBand(with.calibration, WheelCalibration::kErrors, "calibration");
 }
 
 TEST(OtherMeasurements, AGyroAndItsBias) {
@@ -79,7 +79,7 @@ TEST(OtherMeasurements, ARobotThatKnowsThatItStands) {
 TEST(OtherMeasurements, AllTogether) {
   const SensorStatistics with = simulate(everySensor());
   expectInBand(with.pose, 3, "pose");
-  expectInBand(with.calibration, 4, "calibration");
+  expectInBand(with.calibration, WheelCalibration::kErrors, "calibration");
   expectInBand(with.bias, 1, "bias");
 }
 
@@ -103,7 +103,7 @@ TEST(OtherMeasurements, WheelsThatSlipAreNotBelievedAgainstTheGyro) {
   z.value << 0.01;
   z.noise << 1e-6;
   slip.measured.push_back(z);
-  const OdometryIncrement refined = filter.refined(slip);
+  const OdometryIncrement refined = filter.refined(slip, 0.0);
   filter.propagate(slip);
   EXPECT_NEAR(filter.pose().yaw, 0.01, 0.005);
   EXPECT_NEAR(filter.gyroBias().value, 0.0, 0.003);
@@ -119,7 +119,7 @@ TEST(OtherMeasurements, WhatIsRefinedIsWhatIsPropagated) {
   z.value << increment.before_from_after.yaw + 0.02;
   z.noise << 1e-4;
   increment.measured.push_back(z);
-  const OdometryIncrement refined = filter.refined(increment);
+  const OdometryIncrement refined = filter.refined(increment, 0.0);
   filter.propagate(increment);
   const Eigen::Vector3d moved = filter.pose().vector();
   EXPECT_TRUE(matricesNear(refined.before_from_after.vector(), moved, 2e-3)) << "but for the second order";
@@ -162,17 +162,18 @@ Displacement seenToACentimetre(const SE2& reference_from_current) {
 }
 
 TEST(OtherMeasurements, OneErrorOfTheWheelsAloneIsEstimatedWhereTheOthersHaveNoStd) {
+  const SE2 start(0.0, 0.0, 0.3);
   const SE2 told(1.0, 0.0, 0.5);
-  WheelCalibration::Jacobian B;  // of the motion, by the scale of the way, of rotations, …
-  B.row(0) << 1.0, 0.0, 0.0, std::cos(0.5) - 1.0;
-  B.row(1) << 0.0, 0.0, 0.0, std::sin(0.5);
-  B.row(2) << 0.0, 0.5, 1.0, 0.0;
-  for (Eigen::Index i = 0; i < 4; ++i) {
+  WheelCalibration::Jacobian B;  // of the motion, by the scale of the way, of rotations, …, by the floor in x and y
+  B.row(0) << 1.0, 0.0, 0.0, std::cos(0.5) - 1.0, std::cos(0.3), std::sin(0.3);
+  B.row(1) << 0.0, 0.0, 0.0, std::sin(0.5), -std::sin(0.3), std::cos(0.3);
+  B.row(2) << 0.0, 0.5, 1.0, 0.0, 0.0, 0.0;
+  for (Eigen::Index i = 0; i < WheelCalibration::kErrors; ++i) {
     SCOPED_TRACE("error " + std::to_string(i));
     StateOptions states;
     states.calibration_std(i) = 0.05;
     states.calibration_way = 1e12;
-    MultiCloneFilter filter(SE2(), Eigen::Matrix3d::Zero(), states);
+    MultiCloneFilter filter(start, Eigen::Matrix3d::Zero(), states);
     filter.clone(Eigen::VectorXd(0));
     filter.propagate({told, 4e-4 * Eigen::Matrix3d::Identity()});
     const Displacement z = seenToACentimetre(corrected(told, B.col(i) * 0.04));
@@ -180,8 +181,8 @@ TEST(OtherMeasurements, OneErrorOfTheWheelsAloneIsEstimatedWhereTheOthersHaveNoS
     const double signal = 25e-4 * B.col(i).squaredNorm();
     const double gain = signal / (signal + 4e-4 + 1e-4);  // beside noise of the wheels and of the displacement
     const WheelCalibration found = filter.calibration();
-    EXPECT_TRUE(matricesNear(found.error, Eigen::Vector4d::Unit(i) * 0.04 * gain, 1e-12));
-    Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+    EXPECT_TRUE(matricesNear(found.error, WheelCalibration::Vector::Unit(i) * 0.04 * gain, 1e-12));
+    WheelCalibration::Matrix covariance = WheelCalibration::Matrix::Zero();
     covariance(i, i) = 25e-4 * (1.0 - gain);
     EXPECT_TRUE(matricesNear(found.covariance, covariance, 1e-12));
   }
@@ -189,17 +190,39 @@ TEST(OtherMeasurements, OneErrorOfTheWheelsAloneIsEstimatedWhereTheOthersHaveNoS
 
 TEST(OtherMeasurements, BeginWithWhatIsKnownOfThem) {
   StateOptions states = everySensor().states;
-  states.calibration_std << 0.02, 0.0, 0.05, 0.1;  // of rotations there is no error
+  states.calibration_std << 0.02, 0.0, 0.05, 0.1, 0.01, 0.01;  // of rotations there is no error
   WheelCalibration known;
-  known.error << 0.01, 0.3, -0.02, 0.05;
-  known.covariance = Eigen::Vector4d(1e-4, 1e-4, 4e-4, 9e-4).asDiagonal();
+  known.error << 0.01, 0.3, -0.02, 0.05, 0.01, -0.02;
+  known.covariance.diagonal() << 1e-4, 1e-4, 4e-4, 9e-4, 16e-4, 25e-4;
   states.known_calibration = known;
   states.known_gyro_bias = GyroBias{0.004, 1e-6};
   const MultiCloneFilter filter(SE2(), Eigen::Matrix3d::Zero(), states);
-  EXPECT_TRUE(matricesNear(filter.calibration().error, Eigen::Vector4d(0.01, 0.0, -0.02, 0.05), 1e-15));
-  EXPECT_TRUE(matricesNear(filter.calibration().covariance.diagonal(), Eigen::Vector4d(1e-4, 0.0, 4e-4, 9e-4), 1e-15));
+  WheelCalibration expected = known;
+  expected.error(1) = 0.0;
+  expected.covariance(1, 1) = 0.0;
+  EXPECT_TRUE(matricesNear(filter.calibration().error, expected.error, 1e-15));
+  EXPECT_TRUE(matricesNear(filter.calibration().covariance, expected.covariance, 1e-15));
   EXPECT_EQ(filter.gyroBias().value, 0.004);
   EXPECT_NEAR(filter.gyroBias().variance, 1e-6, 1e-18);
+}
+
+/// A carpet lies where it lies, whatever its direction is called in another world.
+TEST(OtherMeasurements, WhatTheFloorDoesIsTurnedWithTheWorld) {
+  StateOptions states;
+  states.calibration_std << 0.0, 0.0, 0.0, 0.1, 0.01, 0.01;
+  WheelCalibration known;
+  known.error << 0.0, 0.0, 0.0, 0.05, 0.01, 0.02;
+  known.covariance.diagonal() << 0.0, 0.0, 0.0, 1e-4, 4e-6, 9e-6;
+  states.known_calibration = known;
+  MultiCloneFilter filter(SE2(3.0, 1.0, 0.2), 1e-6 * Eigen::Matrix3d::Identity(), states);
+  filter.enterWorld({SE2(-7.0, 2.0, 0.2 + M_PI / 2.0), 1e-6 * Eigen::Matrix3d::Identity()});
+  const WheelCalibration there = filter.calibration();
+  EXPECT_TRUE(matricesNear(there.error, (WheelCalibration::Vector() << 0, 0, 0, 0.05, -0.02, 0.01).finished(), 1e-9));
+  WheelCalibration::Vector variances;
+  variances << 0.0, 0.0, 0.0, 1e-4, 9e-6, 4e-6;
+  EXPECT_TRUE(matricesNear(there.covariance.diagonal(), variances, 1e-12));
+  EXPECT_TRUE(matricesNear(there.error, known.turned(M_PI / 2.0).error, 1e-9));
+  EXPECT_TRUE(matricesNear(there.covariance, known.turned(M_PI / 2.0).covariance, 1e-9));
 }
 
 /// One wheel is larger than the other: what that turns the robot by on its way ahead it turns it back by when it

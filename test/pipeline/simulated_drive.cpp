@@ -32,7 +32,8 @@ SimulatedDrive::SimulatedDrive(const Wheels& wheels, int duration_ms, World worl
     const bool slips = ms >= wheels.stand_still_from && ms < wheels.stand_still_to;
     const double way = motion.translation().norm();
     const double scale = wheels.scale * (ms >= wheels.spin_from && ms < wheels.spin_to ? wheels.spin : 1.0);
-    const SE2 meant(scale * motion.x, scale * motion.y,
+    const Eigen::Vector2d rolled = motion.translation() - way * (truth(ms).rotation().transpose() * wheels.pile);
+    const SE2 meant(scale * rolled.x(), scale * rolled.y(),
                     motion.yaw + wheels.yaw_per_meter * way + (ms == wheels.yaw_slip_at ? wheels.yaw_slip : 0.0));
     const Eigen::Vector3d noise = random.drawnFrom(modelledIncrement(meant, wheels.noise).covariance);
     wheels_.push_back(slips ? wheels_.back() : compose(wheels_.back(), corrected(meant, noise)));
@@ -95,7 +96,8 @@ LaserScan scanOfACrowd(const SimulatedDrive& drive, int ms) {
 
 CalibrationOptions noCalibration() {
   CalibrationOptions options;
-  options.distance_std = options.rotation_std = options.rotation_per_meter_std = options.laser_ahead_std = 0.0;
+  options.distance_std = options.rotation_std = options.rotation_per_meter_std = 0.0;
+  options.laser_ahead_std = options.floor_std = 0.0;
   return options;
 }
 

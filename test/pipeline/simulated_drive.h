@@ -24,6 +24,7 @@ SE2 roundDrive(double t);
 struct Wheels {
   double scale = 1.03;          ///< of the way
   double yaw_per_meter = 0.03;  ///< [rad/m], to the left
+  Eigen::Vector2d pile = Eigen::Vector2d::Zero();  ///< [m/m] of a carpet: takes the robot along, in the start's frame
   int stand_still_from = 0;     ///< [ms] they slip: they report no motion …
   int stand_still_to = 0;       ///< [ms] … until here
   double spin = 1.0;            ///< they spin: they report so many times the way made …

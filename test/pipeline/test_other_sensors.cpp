@@ -54,7 +54,7 @@ TEST(OtherSensors, WheelsThatAreTooLongAreFoundOut) {
   driven.odometry(0);
   driven.run(0, 30000);
   const WheelCalibration& found = driven.reports.back().calibration;
-  const Eigen::Vector4d std = found.covariance.diagonal().cwiseSqrt();
+  const WheelCalibration::Vector std = found.covariance.diagonal().cwiseSqrt();
   EXPECT_NEAR(found.error(0), 1.0 / 1.05 - 1.0, 3.0 * std(0));
   EXPECT_NEAR(found.error(2), -0.05 / 1.05, 3.0 * std(2));
   EXPECT_LT(found.error(0), -0.024) << "half of it at least";
@@ -106,6 +106,45 @@ TEST(OtherSensors, ALaserThatIsFartherAheadThanToldIsFoundOutByDefault) {
   EXPECT_NEAR(found.error(3), -0.05, 3.0 * std);
 }
 
+/// Good wheels on a carpet.
+Wheels onACarpet() {
+  Wheels wheels;
+  wheels.scale = 1.0;
+  wheels.yaw_per_meter = 0.0;
+  wheels.pile = {0.02, -0.015};
+  return wheels;
+}
+
+TEST(OtherSensors, ACarpetIsFoundOutByDefaultAndWhereItLiesStaysKnown) {
+  const SimulatedDrive drive(onACarpet(), 91000);
+  const PipelineOptions options;
+  Driven driven(drive, options);
+  driven.odometry(0);
+  driven.run(0, 90000);
+  const WheelCalibration found = driven.reports.back().calibration;
+  const Eigen::Vector2d std = found.covariance.diagonal().tail<2>().cwiseSqrt();
+  EXPECT_NEAR(found.error(4), 0.02, 3.0 * std.x());
+  EXPECT_NEAR(found.error(5), -0.015, 3.0 * std.y());
+  EXPECT_GT(found.error.tail<2>().norm(), 0.5 * onACarpet().pile.norm()) << "half of it at least";
+  EXPECT_LT(std.maxCoeff(), 0.7 * options.calibration.floor_std);
+  expectAccurate(drive, driven);
+
+  const SE2 before = driven.pipeline.latest()->odom_from_base;
+  driven.pipeline.setPose(compose(SE2(3.0, 2.0, 1.0), before), Eigen::Matrix3d::Zero(), at(90000));
+  EXPECT_TRUE(matricesNear(driven.pipeline.found().calibration->error, found.turned(1.0).error, 1e-3));
+}
+
+TEST(OtherSensors, ACarpetThatHasBeenFoundOutLeadsABlindRobotBetter) {
+  const SimulatedDrive drive(onACarpet(), 37000);
+  PipelineOptions options;
+  options.calibration.floor_std = 0.0;
+  const double without = errorAfterBlindStretch(drive, options);
+  options.calibration.floor_std = 0.03;
+  const double with = errorAfterBlindStretch(drive, options);
+  EXPECT_GT(without, 0.03) << "the drive is no test: the floor is smooth enough";
+  EXPECT_LT(with, 0.6 * without);
+}
+
 /// One side of a corridor along x: doors, in their frames, where chance puts them. side: 1, -1.
 void addDoors(double side, std::mt19937_64& random, World& world) {
   std::uniform_real_distribution<double> chance(0.0, 1.0);
@@ -151,8 +190,8 @@ TEST(OtherSensors, WheelsThatTellTooLongAWayAreFoundOutByDefaultAndACorridorIsNo
   WheelCalibration found;
   const double with = errorAlongDoors(options, &found);
   EXPECT_NEAR(found.error(0), 1.0 / 1.05 - 1.0, 3.0 * std::sqrt(found.covariance(0, 0)));
-  EXPECT_LT(std::sqrt(found.covariance(0, 0)), 0.5 * options.calibration.distance_std);
-  options.calibration.distance_std = 0.0;
+  EXPECT_LT(std::sqrt(found.covariance(0, 0)), 0.6 * options.calibration.distance_std) << "but for what the floor may do";
+  options.calibration.distance_std = options.calibration.floor_std = 0.0;
   const double without = errorAlongDoors(options, &found);
   EXPECT_GT(without, 0.5) << "the corridor is no test: scans see the way well enough";
   EXPECT_LT(with, 0.5 * without);

@@ -136,8 +136,10 @@ TEST(ScanOdometryState, WhatWasFoundOfWheelsGyroAndLaserStays) {
   for (Driven* driven : {&set, &next}) {
     driven->run(10000, 10100);
     const ScanReport& after = driven->reports.back();
-    EXPECT_TRUE(matricesNear(after.calibration.error, before.calibration.error, 1e-4));
-    EXPECT_TRUE(matricesClose(after.calibration.covariance.diagonal(), before.calibration.covariance.diagonal(), 0.01));
+    WheelCalibration expected = before.calibration;
+    if (driven == &set) expected = expected.turned(kElsewhere.yaw - before.estimate->odom_from_base.yaw);  // the floor's
+    EXPECT_TRUE(matricesNear(after.calibration.error, expected.error, 1e-4));
+    EXPECT_TRUE(matricesClose(after.calibration.covariance.diagonal(), expected.covariance.diagonal(), 0.01));
     EXPECT_EQ(after.laser_constants.range_offset.value(), before.laser_constants.range_offset.value());
     EXPECT_EQ(after.laser_constants.sweep_duration.value(), before.laser_constants.sweep_duration.value());
   }

@@ -271,8 +271,8 @@ TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
   report.older_references = 2;
   report.landmarks_used = 3;
   report.landmarks.resize(7);
-  report.calibration.error << 0.03, -0.02, 0.01, 0.07;
-  report.calibration.covariance = Eigen::Vector4d(1e-4, 4e-4, 9e-4, 16e-4).asDiagonal();
+  report.calibration.error << 0.03, -0.02, 0.01, 0.07, 0.015, -0.01;
+  report.calibration.covariance.diagonal() << 1e-4, 4e-4, 9e-4, 16e-4, 25e-4, 36e-4;
   report.laser_constants = {LaserConstant(0.02), LaserConstant(0.01)};
   report.laser_constants.range_offset.add({0.01, 30.0 / 4e-4, 0.0}, 0.0);
   report.laser_constants.sweep_duration.add({0.006, 30.0 / 1e-4, 0.0}, 0.0);
@@ -308,6 +308,10 @@ TEST(Conversions, TheStatusSaysWhatBecameOfTheScan) {
   EXPECT_NEAR(status.calibration_rotation_per_meter_std, 0.03, 1e-12);
   EXPECT_EQ(status.calibration_laser_ahead, 0.07);
   EXPECT_NEAR(status.calibration_laser_ahead_std, 0.04, 1e-12);
+  EXPECT_EQ(status.calibration_floor_x, 0.015);
+  EXPECT_NEAR(status.calibration_floor_x_std, 0.05, 1e-12);
+  EXPECT_EQ(status.calibration_floor_y, -0.01);
+  EXPECT_NEAR(status.calibration_floor_y_std, 0.06, 1e-12);
   EXPECT_NEAR(status.range_offset, 0.005, 1e-12);
   EXPECT_NEAR(status.range_offset_std, std::sqrt(2e-4), 1e-12);
   EXPECT_NEAR(status.sweep_duration, 0.003, 1e-12);

@@ -265,14 +265,16 @@ TEST_F(HealthTest, TheErrorsOfTheWheelsAreToldWhereTheyAreEstimated) {
   verdictAt(100.5);
   EXPECT_EQ(value("error of the wheels: way [1]"), "missing");
   ScanReport report = scan(ScanOutcome::kUpdated, 100.5);
-  report.calibration.error << 0.0312, -0.02, 0.01, 0.07;
-  report.calibration.covariance = Eigen::Vector4d(1e-4, 4e-4, 9e-4, 16e-4).asDiagonal();
+  report.calibration.error << 0.0312, -0.02, 0.01, 0.07, 0.015, -0.01;
+  report.calibration.covariance.diagonal() << 1e-4, 4e-4, 9e-4, 16e-4, 25e-4, 36e-4;
   health_.scanTaken(report);
   verdictAt(100.6);
   EXPECT_EQ(value("error of the wheels: way [1]"), "0.0312 +- 0.0100");
   EXPECT_EQ(value("error of the wheels: rotation [1]"), "-0.0200 +- 0.0200");
   EXPECT_EQ(value("error of the wheels: rotation per meter [rad/m]"), "0.0100 +- 0.0300");
   EXPECT_EQ(value("error of the wheels: laser ahead [m]"), "0.0700 +- 0.0400");
+  EXPECT_EQ(value("error of the wheels: floor x [m/m]"), "0.0150 +- 0.0500");
+  EXPECT_EQ(value("error of the wheels: floor y [m/m]"), "-0.0100 +- 0.0600");
 }
 
 TEST_F(HealthTest, ConstantsOfALaserAreToldWhereTheyAreEstimated) {

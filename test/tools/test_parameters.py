@@ -36,7 +36,7 @@ MUSEUM: Tuple[Parameters, Parameters] = ({}, dict(
     odometry_translation_per_meter=0.1, odometry_translation_per_radian=0.08, odometry_yaw_per_meter=0.2,
     odometry_yaw_per_radian=0.3,
     calibration_distance_std=0.0, calibration_rotation_std=0.0, calibration_rotation_per_meter_std=0.0,
-    calibration_laser_ahead_std=0.0, calibration_way=10.0,
+    calibration_laser_ahead_std=0.0, calibration_floor_std=0.0, calibration_way=10.0,
     references_kept=4, older_references=1, older_dist_linear=1.0,
     older_dist_angular=0.5, older_min_overlap=0.6, older_inflation=2.0, matching_common=0.0,
     gate_probability=0.9, trust_scans_on_slip=False, slip_std_translation=0.2, slip_std_yaw=0.2, slip_max_misfit=0.3,

@@ -9,6 +9,7 @@
 #include "sckf_odometry/core/displacement.h"
 #include "sckf_odometry/core/joint_covariance.h"
 #include "sckf_odometry/core/se2.h"
+#include "sckf_odometry/core/wheel_calibration.h"
 
 namespace sckf {
 
@@ -35,16 +36,6 @@ struct PoseMeasurement {
   Eigen::Matrix3d covariance;  ///< of its additive error in x, y, yaw
 };
 
-/// Systematic errors of the wheels, and of the laser's place: where the wheels tell (x, y, yaw), the true motion is
-/// (x (1 + s) − l (1 − cos yaw), y (1 + s) + l sin yaw, yaw (1 + r) + k x): one wheel is larger than the other, which
-/// turns the robot to the other side when it reverses; the laser is farther ahead, by l, of the point about which they
-/// turn than its mount says.
-struct WheelCalibration {
-  using Jacobian = Eigen::Matrix<double, 3, 4>;          ///< of a motion x, y, yaw by s, r, k, l
-  Eigen::Vector4d error = Eigen::Vector4d::Zero();       ///< s, r, k, l [1, 1, rad/m, m]
-  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< of what `error` errs by
-};
-
 /// What a gyro tells of a robot that does not turn.
 struct GyroBias {
   double value = 0.0;     ///< [rad/s]
@@ -53,10 +44,9 @@ struct GyroBias {
 
 /// States beside the pose that are not cloned (III-F). Where a standard deviation is zero there is no such state.
 struct StateOptions {
-  /// Of s, r, k, l of WheelCalibration: how large they can be [1, 1, rad/m, m]. They are taken for stationary
-  /// processes, which forget what they were within calibration_way [m]: an error of the wheels that passes leaves
-  /// nothing behind.
-  Eigen::Vector4d calibration_std = Eigen::Vector4d::Zero();
+  /// Of the errors of WheelCalibration: how large they can be. They are taken for stationary processes, which forget what
+  /// they were within calibration_way [m]: an error of the wheels that passes leaves nothing behind.
+  WheelCalibration::Vector calibration_std = WheelCalibration::Vector::Zero();
   double calibration_way = 100.0;
 
   double gyro_bias_std = 0.0;    ///< [rad/s] of b at the start …
@@ -102,8 +92,9 @@ class FusionMethod {
   /// innovation: that of the displacement, by the state as it is now.
   virtual void update(const Displacement& displacement, const Innovation& innovation) = 0;
 
-  /// What the increment is with all that is known of the wheels and all that is measured of the motion.
-  virtual OdometryIncrement refined(const OdometryIncrement& increment) const { return increment; }
+  /// What the increment is with all that is known of the wheels and all that is measured of the motion. yaw: of
+  /// base_link in the world before it [rad].
+  virtual OdometryIncrement refined(const OdometryIncrement& increment, double /*yaw*/) const { return increment; }
   virtual WheelCalibration calibration() const { return {}; }
   virtual GyroBias gyroBias() const { return {}; }
 

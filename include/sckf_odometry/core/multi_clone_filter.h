@@ -31,7 +31,7 @@ class MultiCloneFilter : public LandmarkStates {
   GyroBias gyroBias() const override { return {gyro_bias_, varianceOf(gyro_bias_error_)}; }
 
   void propagate(const OdometryIncrement& increment) override;
-  OdometryIncrement refined(const OdometryIncrement& increment) const override;
+  OdometryIncrement refined(const OdometryIncrement& increment, double yaw) const override;
 
   void beginScan() override;
   std::size_t clones() const override { return clones_.size(); }
@@ -82,9 +82,10 @@ class MultiCloneFilter : public LandmarkStates {
   // The motion (multi_clone_filter_motion.cpp).
   void beginCalibration(const std::optional<WheelCalibration>& known);
   Eigen::MatrixXd calibrationCovarianceAtFirst() const;
-  OdometryIncrement calibrated(const OdometryIncrement& increment) const;
-  Eigen::Matrix3Xd byCalibration(const SE2& motion) const;
-  void measureMotion(const OdometryIncrement& motion, const Eigen::Matrix3d& W);
+  OdometryIncrement calibrated(const OdometryIncrement& increment, double yaw) const;
+  Eigen::Matrix3Xd byCalibration(const SE2& motion, double yaw) const;
+  void turnCalibration(double yaw);
+  void measureMotion(const OdometryIncrement& motion, double yaw, const Eigen::Matrix3d& W);
   void forgetCalibration();
 
   // What corrects it (multi_clone_filter.cpp).
@@ -113,8 +114,8 @@ class MultiCloneFilter : public LandmarkStates {
   std::vector<Clone> clones_;                  // the newest first
   std::optional<ErrorState::Ranges> present_;  // of the present scan, once it has been used
 
-  Eigen::Vector4d calibration_ = Eigen::Vector4d::Zero();
-  Eigen::Matrix4Xd calibrated_;  // a column of the identity for each of the four that is estimated
+  WheelCalibration::Vector calibration_ = WheelCalibration::Vector::Zero();
+  WheelCalibration::Columns calibrated_;  // a column of the identity for each error that is estimated
   std::optional<Part> calibration_error_;
   double way_to_forget_ = 0.0;  // [m] since some of it was forgotten
   double gyro_bias_ = 0.0;      // [rad/s]

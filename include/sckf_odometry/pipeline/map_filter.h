@@ -40,7 +40,9 @@ class MapFilter : public LandmarkStates {
     return odom_->predictedDisplacementFrom(clone);
   }
   Innovation innovation(const Displacement& displacement) const override { return odom_->innovation(displacement); }
-  OdometryIncrement refined(const OdometryIncrement& increment) const override { return odom_->refined(increment); }
+  OdometryIncrement refined(const OdometryIncrement& increment, double yaw) const override {
+    return odom_->refined(increment, yaw);
+  }
   WheelCalibration calibration() const override { return odom_->calibration(); }
   GyroBias gyroBias() const override { return odom_->gyroBias(); }
   std::size_t clones() const override { return odom_->clones(); }

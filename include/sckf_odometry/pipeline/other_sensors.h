@@ -7,13 +7,14 @@
 
 namespace sckf {
 
-/// Systematic errors of the wheels as states, which scans find where they tell the motion: how large they can be, 0:
+/// Systematic errors of the wheels and by the floor as states, which scans find where they tell the motion: how large they can be, 0:
 /// there is none. See WheelCalibration. Only method sckf_multi has them.
 struct CalibrationOptions {
   double distance_std = 0.02;            ///< of the way, as a share of it
   double rotation_std = 0.05;            ///< of a rotation, as a share of it
   double rotation_per_meter_std = 0.05;  ///< [rad/m] the rotation that goes with the way
   double laser_ahead_std = 0.1;          ///< [m] how much farther ahead the laser is of where the wheels turn about
+  double floor_std = 0.01;               ///< [m/m] by how much the floor takes the robot along, in x and y of the world
   double way = 1000.0;                   ///< [m] within which they are forgotten
 };
 

@@ -24,7 +24,8 @@
 
 namespace sckf {
 
-/// What an estimate has found of wheels, gyro and lasers, wherever the robot is: for one that begins after it.
+/// What an estimate has found of wheels, floor, gyro and lasers, wherever the robot is: for one in the same odom frame
+/// that begins after it.
 struct Found {
   std::optional<WheelCalibration> calibration;
   std::optional<GyroBias> gyro_bias;
