@@ -44,8 +44,8 @@ struct GyroBias {
 
 /// States beside the pose that are not cloned (III-F). Where a standard deviation is zero there is no such state.
 struct StateOptions {
-  /// Of the errors of WheelCalibration: how large they can be. They are taken for stationary processes, which forget what
-  /// they were within calibration_way [m]: an error of the wheels that passes leaves nothing behind.
+  /// Of the errors of WheelCalibration: how large they can be. They are taken for stationary processes, which forget
+  /// what they were within calibration_way [m]: an error of the wheels that passes leaves nothing behind.
   WheelCalibration::Vector calibration_std = WheelCalibration::Vector::Zero();
   double calibration_way = 100.0;
 

@@ -7,8 +7,8 @@
 
 namespace sckf {
 
-/// Systematic errors of the wheels and by the floor as states, which scans find where they tell the motion: how large they can be, 0:
-/// there is none. See WheelCalibration. Only method sckf_multi has them.
+/// Systematic errors of the wheels and by the floor as states, which scans find where they tell the motion: how large
+/// they can be, 0: there is none. See WheelCalibration. Only method sckf_multi has them.
 struct CalibrationOptions {
   double distance_std = 0.02;            ///< of the way, as a share of it
   double rotation_std = 0.05;            ///< of a rotation, as a share of it
