@@ -42,6 +42,8 @@ def run_program(name: str, arguments: Sequence[object], bin_dir: Optional[Path] 
             reason = _pass_on(stderr, name)
         if program.returncode != 0:
             raise ProgramError(reason or f"{name} ended with {program.returncode}")
+        if reason:
+            sys.stderr.write(f"{name}: {reason}\n")
         printed.seek(0)
         return printed.read()
 

@@ -7,7 +7,7 @@ from typing import Tuple
 import numpy as np
 from scipy.optimize import nnls
 
-UNKNOWN = np.array([0.3, 0.3, 0.3, 0.5, 0.1, 0.1])  # std of each error before the log has been looked at
+UNKNOWN = np.array([0.3, 0.3, 0.3, 0.5, 0.03, 0.03])  # std of each error before the log has been looked at
 DEFAULT_NOISE = np.array([0.05, 0.04, 0.10, 0.15])  # as in config/sckf_odometry.yaml
 LEAST_NOISE = 0.005  # a log on which nothing is seen of one does not say that there is none
 ROBUST = 2.0  # residuals of so many std weigh half: wheels that slip are nothing systematic

@@ -196,7 +196,7 @@ void MultiCloneFilter::enterWorld(const PoseMeasurement& world_from_base) {
   enter(pose_, pose_error_);
   for (Clone& clone : clones_) enter(clone.pose, clone.error);
   for (Landmark& landmark : landmarks_) enter(landmark.pose, landmark.error);
-  turnCalibration(d.yaw);
+  turnCalibration(d.yaw, unknown);
   compass_from_world_ -= d.yaw;
   if (compass_error_) errors_.move(*compass_error_, -kYaw, unknown);
   errors_.remove(unknown);

@@ -51,12 +51,16 @@ OdometryIncrement MultiCloneFilter::calibrated(const OdometryIncrement& incremen
   return motion;
 }
 
-void MultiCloneFilter::turnCalibration(double yaw) {
+/// Into a world that is turned by yaw, and by what that errs by, too.
+void MultiCloneFilter::turnCalibration(double yaw, Part world_error) {
   if (!calibration_error_) return;
-  const WheelCalibration::Matrix R = WheelCalibration::turn(yaw);
-  calibration_ = R * calibration_;
-  const WheelCalibration::Matrix moved = R - WheelCalibration::Matrix::Identity();
-  errors_.move(*calibration_error_, calibrated_.transpose() * moved * calibrated_, *calibration_error_);
+  const Eigen::MatrixXd R = calibrated_.transpose() * WheelCalibration::turn(yaw) * calibrated_;
+  calibration_ = calibrated_ * R * calibrated_.transpose() * calibration_;
+  errors_.move(*calibration_error_, R - MatrixXd::Identity(R.rows(), R.cols()), *calibration_error_);
+  Eigen::Matrix<double, WheelCalibration::kErrors, 3> by_world =
+      Eigen::Matrix<double, WheelCalibration::kErrors, 3>::Zero();
+  by_world.bottomRightCorner<2, 1>() = quarterTurn(calibration_.tail<2>());
+  errors_.move(*calibration_error_, calibrated_.transpose() * by_world, world_error);
 }
 
 void MultiCloneFilter::propagate(const OdometryIncrement& increment) {

@@ -26,4 +26,11 @@ WheelCalibration WheelCalibration::turned(double yaw) const {
   return {R * error, symmetric(R * covariance * R.transpose())};
 }
 
+WheelCalibration WheelCalibration::turnedWithTheRobot(double yaw) const {
+  WheelCalibration there = turned(yaw);
+  const double apart = 2.0 * error.tail<2>().norm() * std::sin(0.5 * yaw);
+  there.covariance.diagonal().tail<2>().array() += 0.5 * apart * apart;
+  return there;
+}
+
 }  // namespace sckf

@@ -32,7 +32,8 @@ class Robot {
         random_(seed),
         room_(sensors.walls, 0.03),
         filter_(corrected(truth_, random_.drawnFrom(kStart)), kStart, estimated(sensors)) {
-    calibration_ = sensors.states.calibration_std.cwiseProduct(WheelCalibration::Vector(random_.gaussian(WheelCalibration::kErrors)));
+    calibration_ = sensors.states.calibration_std.cwiseProduct(
+        WheelCalibration::Vector(random_.gaussian(WheelCalibration::kErrors)));
     bias_ = sensors.states.gyro_bias_std * random_.gaussian();
     compass_from_world_ = random_.uniform(-3.0, 3.0);
     references_.push_back(room_.scan(truth_, random_));
@@ -108,7 +109,8 @@ class Robot {
   void drift(double way) {
     const double kept = std::exp(-way / sensors_.states.calibration_way);
     const WheelCalibration::Vector std = std::sqrt(1.0 - kept * kept) * sensors_.states.calibration_std;
-    calibration_ = kept * calibration_ + std.cwiseProduct(WheelCalibration::Vector(random_.gaussian(WheelCalibration::kErrors)));
+    calibration_ =
+        kept * calibration_ + std.cwiseProduct(WheelCalibration::Vector(random_.gaussian(WheelCalibration::kErrors)));
     bias_ += std::sqrt(kDt) * sensors_.states.gyro_bias_drift * random_.gaussian();
     compass_from_world_ += std::sqrt(kDt) * sensors_.states.heading_drift * random_.gaussian();
   }

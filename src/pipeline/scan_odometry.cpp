@@ -231,20 +231,28 @@ std::optional<Estimate> ScanOdometry::latest() const {
   return Estimate{latest_->stamp, latest_->estimate.pose(), latest_->estimate.covariance(), twist_.twist()};
 }
 
-void ScanOdometry::setPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp) {
+bool ScanOdometry::setPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp) {
   checkPose(odom_from_base, covariance);
+  if (!filter_ && before_.calibration) {
+    before_.calibration = before_.calibration->turnedWithTheRobot(wrapAngle(odom_from_base.yaw - start_.yaw));
+  }
   start_ = odom_from_base;
   start_covariance_ = covariance;
-  if (!filter_) return;
-  const bool is_past = stamp <= filter_stamp_;
+  if (!filter_) return true;
   PoseMeasurement now{odom_from_base, covariance};
-  if (const auto brought_forward = is_past ? broughtForward({stamp, now}) : std::nullopt) {
+  const bool is_past = stamp <= filter_stamp_;
+  const std::optional<PoseMeasurement> brought_forward = is_past ? broughtForward({stamp, now}) : std::nullopt;
+  const bool is_known = brought_forward || (!is_past && odometry_.covers(stamp));
+  const Stamp newest = odometry_.newest();
+  const bool is_now = stamp > newest && stamp <= newest + toDuration(options_.odometry_timeout);
+  if (brought_forward) {
     now = *brought_forward;
   } else {
-    propagateTo(!is_past && odometry_.covers(stamp) ? stamp : odometry_.newest());
+    propagateTo(is_known ? stamp : newest);
   }
   trail_.move(compose(now.pose, inverse(filter_->pose())));  // by which the next pose may be brought forward
   begin(now.pose, now.covariance, filter_stamp_);
+  return is_known || is_now;
 }
 
 void ScanOdometry::setOptions(const PipelineOptions& options) {
@@ -266,7 +274,8 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
   before_ = found();
   states.known_calibration = before_.calibration;
   if (filter_ && before_.calibration) {  // what is told in x and y of the world
-    states.known_calibration = before_.calibration->turned(odom_from_base.yaw - filter_->pose().yaw);
+    const double turned = wrapAngle(odom_from_base.yaw - filter_->pose().yaw);
+    states.known_calibration = before_.calibration->turnedWithTheRobot(turned);
   }
   states.known_gyro_bias = before_.gyro_bias;
   const Eigen::Matrix3d P = withYawUpToATurn(symmetric(covariance));

@@ -91,8 +91,7 @@ void ScanOdometry::carryOn() {
   }
   const auto carry = [this](CarriedOn& carried, Stamp to) {
     for (const OdometryBuffer::Step& step : odometry_.steps(carried.stamp, to)) {
-      carried.estimate.propagate(
-          filter_->refined(increment(step, carried.standstill), carried.estimate.pose().yaw));
+      carried.estimate.propagate(filter_->refined(increment(step, carried.standstill), carried.estimate.pose().yaw));
     }
     carried.stamp = to;
   };

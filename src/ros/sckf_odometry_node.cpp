@@ -131,9 +131,9 @@ Services::Actions ScKfOdometryNode::serviceActions() {
   Services::Actions actions;
   actions.reset = [this] { guarded([this] { reset(); }); };
   actions.set_pose = [this](const geometry_msgs::PoseWithCovarianceStamped& message) {
-    std::string problem = "it failed, see the log";
-    guarded([&] { problem = setPose(message); });
-    return problem;
+    Services::Actions::Answer answer{false, "it failed, see the log"};
+    guarded([&] { answer = setPose(message); });
+    return answer;
   };
   actions.pause = [this](bool paused) { guarded([this, paused] { pause(paused); }); };
   return actions;
@@ -340,18 +340,23 @@ void ScKfOdometryNode::reset() {
   publisher_.clearViews();
 }
 
-std::string ScKfOdometryNode::setPose(const geometry_msgs::PoseWithCovarianceStamped& message) {
+Services::Actions::Answer ScKfOdometryNode::setPose(const geometry_msgs::PoseWithCovarianceStamped& message) {
   std::string problem;
   const std::optional<GivenPose> pose = toGivenPose(message, options_.node.odom_frame, &problem);
   if (!pose) {
     ROS_WARN_STREAM_NAMED(kLogger, "set_pose refused: " << problem);
-    return problem;
+    return {false, problem};
   }
   pose_keeper_.forget();
-  pipeline_->setPose(pose->odom_from_base, pose->covariance, pose->stamp);
+  const bool of_its_stamp = pipeline_->setPose(pose->odom_from_base, pose->covariance, pose->stamp);
   publisher_.clearViews();
   ROS_INFO_STREAM_NAMED(kLogger, "pose set to " << pose->odom_from_base.vector().transpose());
-  return "";
+  if (of_its_stamp || message.header.stamp.isZero()) return {true, ""};
+  std::ostringstream remark;
+  remark << "the pose holds from now on: of the motion since its stamp, " << message.header.stamp
+         << " s, nothing is known; expected 0, or one that the odometry of the last ~max_scan_delay covers";
+  ROS_WARN_STREAM_NAMED(kLogger, "set_pose: " << remark.str());
+  return {true, remark.str()};
 }
 
 void ScKfOdometryNode::pause(bool paused) {

@@ -29,8 +29,9 @@ Services::Services(ros::NodeHandle nh, ros::NodeHandle private_nh, const Actions
   servers_.push_back(advertise<sckf_odometry::SetPose>(
       private_nh, "set_pose",
       [actions](sckf_odometry::SetPose::Request& request, sckf_odometry::SetPose::Response& response) {
-        response.message = actions.set_pose(request.pose);
-        response.success = response.message.empty();
+        const Actions::Answer answer = actions.set_pose(request.pose);
+        response.success = answer.success;
+        response.message = answer.message;
       }));
   const auto advertisePause = [&](const std::string& name, bool paused_if_true) {
     servers_.push_back(advertise<std_srvs::SetBool>(

@@ -231,7 +231,7 @@ void checkNames(const std::map<std::string, std::string>& names, const std::stri
       throw boost::program_options::error("--" + option + " '" + name + "': expected " + expected);
     };
     if (name.empty()) fail("the name of a " + kind);
-    if (name == "/tf_static") fail("another topic than that of the laser's place");
+    if (kind == "topic" && name == "/tf_static") fail("another topic than that of the laser's place");
     const auto [other, is_new] = options.emplace(name, option);
     if (!is_new) fail("another " + kind + " than --" + other->second);
   }

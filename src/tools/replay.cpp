@@ -123,8 +123,9 @@ class Replay {
     std::fprintf(stderr, "%s: the scans carry on alone\n", problem.c_str());
   }
 
-  /// Of sensors that the parameters ask for, and that have said nothing: the robot goes on without.
+  /// Of sensors that the parameters ask for, and that have said nothing in all of the bag: the robot goes on without.
   void warnOfOthers() const {
+    if (arguments_.start > 0.0 || arguments_.duration > 0.0) return;
     const PipelineOptions& pipeline = options_.pipeline;
     const auto warn = [this](const char* type, const std::string& topic, const char* parameter, const char* option) {
       std::fprintf(stderr, "%s: no %s on %s, expected with %s: true; see %s: the estimate goes without\n",

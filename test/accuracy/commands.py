@@ -44,11 +44,13 @@ def written(output: Path) -> Iterator[rosbag.Bag]:
         raise TrajectoryError(f"{output}: cannot be written: expected a file")
     part = output.with_name(output.name + ".part")
     try:
-        with rosbag.Bag(str(part), "w") as out:
-            yield out
-        part.replace(output)
+        out = rosbag.Bag(str(part), "w")
     except OSError as error:
         raise TrajectoryError(f"{output}: cannot be written: {error.strerror or error}") from error
+    try:
+        with out:
+            yield out
+        part.replace(output)
     finally:
         if part.exists():
             part.unlink()

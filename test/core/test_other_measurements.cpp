@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -220,9 +221,47 @@ TEST(OtherMeasurements, WhatTheFloorDoesIsTurnedWithTheWorld) {
   EXPECT_TRUE(matricesNear(there.error, (WheelCalibration::Vector() << 0, 0, 0, 0.05, -0.02, 0.01).finished(), 1e-9));
   WheelCalibration::Vector variances;
   variances << 0.0, 0.0, 0.0, 1e-4, 9e-6, 4e-6;
-  EXPECT_TRUE(matricesNear(there.covariance.diagonal(), variances, 1e-12));
+  EXPECT_TRUE(matricesNear(there.covariance.diagonal(), variances, 1e-9)) << "but for what the yaw there errs by";
   EXPECT_TRUE(matricesNear(there.error, known.turned(M_PI / 2.0).error, 1e-9));
   EXPECT_TRUE(matricesNear(there.covariance, known.turned(M_PI / 2.0).covariance, 1e-9));
+}
+
+/// A map that is entered with a wrong yaw: what corrects that later turns the carpet, too.
+TEST(OtherMeasurements, AYawThatIsCorrectedLaterTurnsWhatTheFloorDoes) {
+  StateOptions states;
+  states.calibration_std << 0.0, 0.0, 0.0, 0.0, 0.01, 0.01;
+  states.calibration_way = 1e12;
+  WheelCalibration known;
+  known.error << 0.0, 0.0, 0.0, 0.0, 0.02, 0.0;
+  known.covariance.diagonal() << 0.0, 0.0, 0.0, 0.0, 1e-6, 1e-6;
+  states.known_calibration = known;
+  MultiCloneFilter filter(SE2(), 1e-6 * Eigen::Matrix3d::Identity(), states);
+  constexpr double kWrong = 0.26;  // [rad]
+  filter.enterWorld({SE2(0.0, 0.0, kWrong), Eigen::Vector3d(1e-4, 1e-4, kWrong * kWrong).asDiagonal()});
+  EXPECT_NEAR(filter.calibration().error(5), 0.02 * std::sin(kWrong), 1e-9) << "as if it lay there";
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  for (int i = 1; i <= 20; ++i) {
+    filter.propagate({SE2(0.5, 0.0, 0.0), 1e-6 * Eigen::Matrix3d::Identity()});
+    const SE2 truth(0.5 * i * 1.02, 0.0, 0.0);
+    filter.update(PoseMeasurement{truth, Eigen::Vector3d(1e-4, 1e-4, 100.0).asDiagonal()}, kInfinite);
+  }
+  EXPECT_NEAR(filter.calibration().error(4), 0.02, 0.001);
+  EXPECT_NEAR(filter.calibration().error(5), 0.0, 0.001);
+}
+
+/// Carried there or found to have drifted: the carpet lies where it lay, or is turned with the estimate.
+TEST(OtherMeasurements, OfARobotThatIsToldToFaceElsewhereTheFloorIsLessCertain) {
+  WheelCalibration here;
+  here.error << 0.01, 0.02, 0.03, 0.04, 0.015, 0.0;
+  here.covariance.diagonal() << 1e-4, 1e-4, 1e-4, 1e-4, 9e-6, 9e-6;
+  const WheelCalibration same = here.turnedWithTheRobot(0.0);
+  EXPECT_TRUE(matricesNear(same.error, here.error, 0.0));
+  EXPECT_TRUE(matricesNear(same.covariance, here.covariance, 0.0));
+  const WheelCalibration back = here.turnedWithTheRobot(M_PI);
+  EXPECT_TRUE(matricesNear(back.error.head<4>(), here.error.head<4>(), 0.0));
+  EXPECT_NEAR(back.error(4), -0.015, 1e-12);
+  EXPECT_NEAR(back.covariance(4, 4), 9e-6 + 0.5 * 0.03 * 0.03, 1e-12);
+  EXPECT_NEAR(back.covariance(0, 0), 1e-4, 1e-18);
 }
 
 /// One wheel is larger than the other: what that turns the robot by on its way ahead it turns it back by when it

@@ -132,6 +132,11 @@ TEST(OtherSensors, ACarpetIsFoundOutByDefaultAndWhereItLiesStaysKnown) {
   const SE2 before = driven.pipeline.latest()->odom_from_base;
   driven.pipeline.setPose(compose(SE2(3.0, 2.0, 1.0), before), Eigen::Matrix3d::Zero(), at(90000));
   EXPECT_TRUE(matricesNear(driven.pipeline.found().calibration->error, found.turned(1.0).error, 1e-3));
+
+  ScanOdometry paused(options, before, Eigen::Matrix3d::Zero(), {found, {}, {}});
+  paused.setPose(compose(SE2(3.0, 2.0, 1.0), before), Eigen::Matrix3d::Zero(), at(45000));
+  paused.addOdometry(drive.odometry(90000));
+  EXPECT_TRUE(matricesNear(paused.found().calibration->error, found.turned(1.0).error, 1e-3)) << "before any odometry";
 }
 
 TEST(OtherSensors, ACarpetThatHasBeenFoundOutLeadsABlindRobotBetter) {
@@ -190,7 +195,8 @@ TEST(OtherSensors, WheelsThatTellTooLongAWayAreFoundOutByDefaultAndACorridorIsNo
   WheelCalibration found;
   const double with = errorAlongDoors(options, &found);
   EXPECT_NEAR(found.error(0), 1.0 / 1.05 - 1.0, 3.0 * std::sqrt(found.covariance(0, 0)));
-  EXPECT_LT(std::sqrt(found.covariance(0, 0)), 0.6 * options.calibration.distance_std) << "but for what the floor may do";
+  EXPECT_LT(std::sqrt(found.covariance(0, 0)), 0.6 * options.calibration.distance_std)
+      << "but for what the floor may do";
   options.calibration.distance_std = options.calibration.floor_std = 0.0;
   const double without = errorAlongDoors(options, &found);
   EXPECT_GT(without, 0.5) << "the corridor is no test: scans see the way well enough";

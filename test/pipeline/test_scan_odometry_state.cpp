@@ -137,7 +137,9 @@ TEST(ScanOdometryState, WhatWasFoundOfWheelsGyroAndLaserStays) {
     driven->run(10000, 10100);
     const ScanReport& after = driven->reports.back();
     WheelCalibration expected = before.calibration;
-    if (driven == &set) expected = expected.turned(kElsewhere.yaw - before.estimate->odom_from_base.yaw);  // the floor's
+    if (driven == &set) {
+      expected = expected.turnedWithTheRobot(kElsewhere.yaw - before.estimate->odom_from_base.yaw);
+    }
     EXPECT_TRUE(matricesNear(after.calibration.error, expected.error, 1e-4));
     EXPECT_TRUE(matricesClose(after.calibration.covariance.diagonal(), expected.covariance.diagonal(), 0.01));
     EXPECT_EQ(after.laser_constants.range_offset.value(), before.laser_constants.range_offset.value());
@@ -153,7 +155,7 @@ TEST(ScanOdometryState, ThePoseHoldsAtItsStamp) {
   driven.run(0, 3000);
   driven.odometry(3020);
   driven.odometry(3100);
-  driven.pipeline.setPose(kElsewhere, kCovariance, at(3050));
+  EXPECT_TRUE(driven.pipeline.setPose(kElsewhere, kCovariance, at(3050)));
   const SE2 moved = between(kElsewhere, driven.pipeline.latest()->odom_from_base);
   const Eigen::Vector3d e = error(moved, between(drive.wheels(3050), drive.wheels(3100)));
   EXPECT_LT(e.cwiseAbs().maxCoeff(), 2e-3) << e.transpose();
@@ -167,7 +169,7 @@ TEST(ScanOdometryState, APoseOfBeforeTheLastScanIsBroughtForward) {
     Driven driven(drive);
     driven.odometry(0);
     driven.run(0, 3020);
-    driven.pipeline.setPose(kElsewhere, kCovariance, at(ms));
+    EXPECT_TRUE(driven.pipeline.setPose(kElsewhere, kCovariance, at(ms)));
     EXPECT_EQ(driven.pipeline.latest()->stamp, at(3020));
     const SE2 moved = between(kElsewhere, driven.pipeline.latest()->odom_from_base);
     const Eigen::Vector3d e = error(moved, between(drive.truth(ms), drive.truth(3020)));
@@ -200,11 +202,12 @@ TEST(ScanOdometryState, APoseOfBetweenScansFarApartIsBroughtForwardByTheWheels) 
 /// A stamp of zero, one that is long past, one from the future: none of which the motion is at hand.
 TEST(ScanOdometryState, WithoutMotionSinceItsStampThePoseHoldsNow) {
   const SimulatedDrive drive;
-  for (const Stamp stamp : {Stamp(0), at(-5000), at(900000)}) {
+  for (const Stamp stamp : {Stamp(0), at(-5000), at(3050), at(900000)}) {
     Driven driven(drive);
     driven.odometry(0);
     driven.run(0, 3020);
-    driven.pipeline.setPose(kElsewhere, kCovariance, stamp);
+    const bool is_now = stamp == at(3050);  // but for what the wheels are late
+    EXPECT_EQ(driven.pipeline.setPose(kElsewhere, kCovariance, stamp), is_now);
     EXPECT_EQ(driven.pipeline.latest()->stamp, at(3020));
     EXPECT_TRUE(matricesNear(driven.pipeline.latest()->odom_from_base.vector(), kElsewhere.vector(), 0.0));
     EXPECT_TRUE(matricesNear(driven.pipeline.latest()->covariance, kCovariance, 0.0));

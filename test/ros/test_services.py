@@ -77,6 +77,9 @@ class Services(unittest.TestCase):
         cls.after_refusals = cls.drive(1.07)  # up to where a scan comes next, and the newest odometry stays what it is
         cls.set = cls.service['set_pose'](pose_message())
         cls.after_set = cls.drive(3.0)
+        unknown = pose_message()
+        unknown.header.stamp = rospy.Time(5)
+        cls.set_of_old = cls.service['set_pose'](unknown)
         cls.after_topic = cls.set_by_topic()
         cls.drive_on_a_pause()
         cls.change_parameters()
@@ -117,7 +120,7 @@ class Services(unittest.TestCase):
         publisher = rospy.Publisher('set_pose', PoseWithCovarianceStamped, queue_size=1)
         helpers.wait_until(lambda: publisher.get_num_connections() > 0, 'a subscriber to set_pose')
         publisher.publish(pose_message(-GIVEN, std=np.zeros(3), frame='/odom'))
-        helpers.wait_until(lambda: len(cls.recorder.log('pose set to')) == 2, 'the pose by topic')
+        helpers.wait_until(lambda: len(cls.recorder.log('pose set to')) == 3, 'the pose by topic')
         return cls.drive(1.0)
 
     @classmethod
@@ -188,6 +191,12 @@ class Services(unittest.TestCase):
         for message in self.after_set:
             self.assertTrue(np.isfinite(message.pose.covariance).all())
         np.testing.assert_allclose(np.sqrt(np.diag(helpers.covariance(self.after_set[0]))), STD, rtol=0.2)
+
+    def test_a_stamp_of_which_nothing_is_known_is_told(self):
+        self.assertEqual((self.set.success, self.set.message), (True, ''))
+        self.assertTrue(self.set_of_old.success)
+        self.assertIn('its stamp, 5.000000000 s, nothing is known; expected 0', self.set_of_old.message)
+        self.assertTrue(self.recorder.log('set_pose: ' + self.set_of_old.message))
 
     def test_a_pose_by_topic_is_exact_where_its_covariance_is_zero(self):
         begin = self.after_set[-1].header.stamp.to_sec()

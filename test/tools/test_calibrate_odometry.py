@@ -73,6 +73,13 @@ class NumbersTest(unittest.TestCase):
         self.assertGreater(found.std[3], 0.4)
         self.assertLess(found.std[0], 0.01)
 
+    def test_a_robot_that_faces_one_way_does_not_tell_way_and_floor_apart(self) -> None:
+        wheels, scans, matching, headings = drive(self.ERRORS * np.array([1, 1, 1, 1, 0, 0]), self.NOISE, 5)
+        wheels[:, 2] = scans[:, 2] = headings[:] = 0.0
+        found = calibrate(wheels, scans, matching, headings)
+        self.assertGreater(found.std[4], 0.02, "of the floor, which is not told")
+        self.assertLess(found.std[0], 0.04, "of the way, which is, but for what a carpet may do")
+
 
 def weaving(t: float) -> np.ndarray:
     """Round the room's middle, to the left and to the right by turns."""

@@ -84,7 +84,7 @@ class MultiCloneFilter : public LandmarkStates {
   Eigen::MatrixXd calibrationCovarianceAtFirst() const;
   OdometryIncrement calibrated(const OdometryIncrement& increment, double yaw) const;
   Eigen::Matrix3Xd byCalibration(const SE2& motion, double yaw) const;
-  void turnCalibration(double yaw);
+  void turnCalibration(double yaw, Part world_error);
   void measureMotion(const OdometryIncrement& motion, double yaw, const Eigen::Matrix3d& W);
   void forgetCalibration();
 

@@ -29,6 +29,10 @@ struct WheelCalibration {
   /// What `error` becomes where x and y of the world are taken for others, against which it is turned by yaw [rad].
   static Matrix turn(double yaw);
   WheelCalibration turned(double yaw) const;
+
+  /// The same where the robot is told to face elsewhere by yaw, and nobody says whether the estimate had drifted by so
+  /// much, so that the world is turned, or somebody has carried the robot, so that it is not: turned, less certain.
+  WheelCalibration turnedWithTheRobot(double yaw) const;
 };
 
 }  // namespace sckf

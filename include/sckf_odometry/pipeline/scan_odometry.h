@@ -71,11 +71,11 @@ class ScanOdometry {
   std::optional<Estimate> latest() const;
 
   /// The robot was there, whatever has been estimated. At a stamp before the last scan: brought forward by the motion
-  /// since, if it is no longer ago than scans may be late. Of which no motion is at hand: there it is now.
+  /// since, if it is no longer ago than scans may be late. Of which no motion is at hand: there it is now; false then.
   /// Nothing is kept of what relates the estimate to its past: the next scan becomes the reference. What has been found
-  /// of wheels, gyro and lasers stays. Before the first odometry: where the estimate starts. Throws as the constructor
-  /// does.
-  void setPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp);
+  /// of wheels, gyro and lasers stays; of the floor it is turned with the robot. Before the first odometry: where the
+  /// estimate starts. Throws as the constructor does.
+  bool setPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp);
 
   /// From the next scan on; the estimate and its references stay. Throws as checkChange() does.
   void setOptions(const PipelineOptions& options);

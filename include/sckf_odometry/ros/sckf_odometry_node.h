@@ -83,7 +83,7 @@ class ScKfOdometryNode {
              const Found& before = {});
   void followTime(Stamp jump);
   void reset();
-  std::string setPose(const geometry_msgs::PoseWithCovarianceStamped& message);  ///< returns what is wrong with it
+  Services::Actions::Answer setPose(const geometry_msgs::PoseWithCovarianceStamped& message);
   void pause(bool paused);
   void keepPose();
 

@@ -16,9 +16,13 @@ namespace sckf {
 class Services {
  public:
   struct Actions {
+    /// Whether it has been done, and what there is to say.
+    struct Answer {
+      bool success;
+      std::string message;
+    };
     std::function<void()> reset;
-    /// Returns what is wrong with the pose; empty: it has been taken.
-    std::function<std::string(const geometry_msgs::PoseWithCovarianceStamped&)> set_pose;
+    std::function<Answer(const geometry_msgs::PoseWithCovarianceStamped&)> set_pose;
     std::function<void(bool paused)> pause;
   };
 

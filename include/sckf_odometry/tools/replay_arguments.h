@@ -28,7 +28,8 @@ struct ReplayArguments {
 /// expected.
 std::optional<ReplayArguments> parseReplayArguments(int argc, char** argv);
 
-/// Throws std::invalid_argument that names the file, the parameter, its value and what is expected.
+/// Throws std::invalid_argument that names the file, the parameter, its value and what is expected, or
+/// boost::program_options::error if an option does not go with them.
 Options optionsFor(const ReplayArguments& arguments);
 
 }  // namespace sckf
