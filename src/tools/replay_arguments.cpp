@@ -81,7 +81,7 @@ std::optional<ReplayArguments> parseReplayArguments(int argc, char** argv) {
   arguments.odom_topic = topicOf("odom-topic", arguments.odom_topic);
   arguments.imu_topic = topicOf("imu-topic", arguments.imu_topic);
   arguments.pose_update_topic = topicOf("pose-update-topic", arguments.pose_update_topic);
-  for (std::string& topic : arguments.scan_topics) topic = topicOf("scan-topic", topic);
+  for (const std::string& topic : arguments.scan_topics) topicOf("scan-topic", topic);  // messages name it as given
   return arguments;
 }
 
