@@ -2,8 +2,10 @@
 from __future__ import annotations
 
 import copy
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from pathlib import Path
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 import rosbag
@@ -28,6 +30,16 @@ class Recording:
     wheels: Optional[Trajectory]
     estimate: Optional[Trajectory]
     latencies: np.ndarray  # [s] of the bag's clock from the scan's arrival to the estimate's, of scans that have both
+
+
+@contextmanager
+def opened(path: str | Path) -> Iterator[rosbag.Bag]:
+    """A bag to read; a TrajectoryError where it is none."""
+    try:
+        with rosbag.Bag(str(path)) as bag:
+            yield bag
+    except (OSError, rosbag.ROSBagException) as error:
+        raise TrajectoryError(f"{path}: expected a bag: {getattr(error, 'strerror', None) or error}") from error
 
 
 def read_recording(path: str, topics: Topics = Topics()) -> Recording:
@@ -68,12 +80,9 @@ def _read_messages(path: str, topics: Topics) -> Dict[str, List[Tuple[Any, float
     """Per topic the messages, each with the time of its record."""
     wanted = [topics.scan, topics.odometry, *topics.estimate, "/tf", "/tf_static"]
     messages: Dict[str, List[Tuple[Any, float]]] = {topic: [] for topic in wanted}
-    try:
-        with rosbag.Bag(path) as bag:
-            for topic, message, time in bag.read_messages(wanted):
-                messages[topic].append((message, time.to_sec()))
-    except (OSError, rosbag.ROSBagException) as error:
-        raise TrajectoryError(f"{path}: expected a bag: {getattr(error, 'strerror', None) or error}") from error
+    with opened(path) as bag:
+        for topic, message, time in bag.read_messages(wanted):
+            messages[topic].append((message, time.to_sec()))
     return messages
 
 

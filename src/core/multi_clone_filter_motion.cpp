@@ -23,6 +23,12 @@ void allowForSlip(const MotionMeasurement& z, const Innovation::Vector& r, const
   if (r.size() == 1 && r(0) * r(0) > kContradiction * S(0, 0)) Q += z.seen.transpose() * r * r.transpose() * z.seen;
 }
 
+/// By the errors of the calibration; zero where the wheels do not tell the increment.
+WheelCalibration::Jacobian byCalibration(const OdometryIncrement& increment, double yaw) {
+  if (!increment.by_wheels) return WheelCalibration::Jacobian::Zero();
+  return WheelCalibration::jacobian(increment.before_from_after, yaw);
+}
+
 }  // namespace
 
 Eigen::MatrixXd MultiCloneFilter::calibrationCovarianceAtFirst() const {
@@ -38,16 +44,10 @@ void MultiCloneFilter::beginCalibration(const std::optional<WheelCalibration>& k
   calibration_error_ = errors_.add(calibrated_.transpose() * known->covariance * calibrated_);
 }
 
-/// By those that are estimated.
-Eigen::Matrix3Xd MultiCloneFilter::byCalibration(const SE2& motion, double yaw) const {
-  return WheelCalibration::jacobian(motion, yaw) * calibrated_;
-}
-
-OdometryIncrement MultiCloneFilter::calibrated(const OdometryIncrement& increment, double yaw) const {
+OdometryIncrement MultiCloneFilter::calibrated(const OdometryIncrement& increment,
+                                               const WheelCalibration::Jacobian& B) const {
   OdometryIncrement motion = increment;
-  if (!increment.by_wheels) return motion;
-  const SE2& u = increment.before_from_after;
-  motion.before_from_after = corrected(u, WheelCalibration::jacobian(u, yaw) * calibration_);
+  if (increment.by_wheels) motion.before_from_after = corrected(increment.before_from_after, B * calibration_);
   return motion;
 }
 
@@ -64,19 +64,17 @@ void MultiCloneFilter::turnCalibration(double yaw, Part world_error) {
 }
 
 void MultiCloneFilter::propagate(const OdometryIncrement& increment) {
-  const double yaw_before = pose_.yaw;
-  const OdometryIncrement motion = calibrated(increment, yaw_before);
+  const WheelCalibration::Jacobian B = byCalibration(increment, pose_.yaw);
+  const OdometryIncrement motion = calibrated(increment, B);
   Matrix3d G;
   pose_ = compose(pose_, motion.before_from_after, nullptr, &G);  // (8)
   const Matrix3d W = inverseOfAdditive(pose_) * G;
   const bool calibrates = calibration_error_ && increment.by_wheels;
-  if (calibrates) {
-    errors_.move(pose_error_, W * byCalibration(increment.before_from_after, yaw_before), *calibration_error_);
-  }
+  if (calibrates) errors_.move(pose_error_, W * B * calibrated_, *calibration_error_);
   if (increment.measured.empty()) {
     errors_.disturb(pose_error_, W * increment.covariance * W.transpose());  // (9)-(14)
   } else {
-    measureMotion(increment, yaw_before, W);
+    measureMotion(increment, B, W);
   }
   if (calibrates) {
     constexpr double kLongest = 0.05;  // of the way after which the calibration may be another one, without a reference
@@ -87,9 +85,8 @@ void MultiCloneFilter::propagate(const OdometryIncrement& increment) {
 }
 
 /// The wheels' noise is a part of the state while others tell of the motion.
-void MultiCloneFilter::measureMotion(const OdometryIncrement& increment, double yaw, const Matrix3d& W) {
-  WheelCalibration::Jacobian B = WheelCalibration::Jacobian::Zero();
-  if (increment.by_wheels) B = WheelCalibration::jacobian(increment.before_from_after, yaw);
+void MultiCloneFilter::measureMotion(const OdometryIncrement& increment, const WheelCalibration::Jacobian& B,
+                                     const Matrix3d& W) {
   const Vector3d u = increment.before_from_after.vector();
   const auto expected = [&](const Vector3d& noise) -> Vector3d { return u + B * calibration_ + noise; };
   const auto measurement = [&](const MotionMeasurement& z, const Vector3d& noise, const std::optional<Part>& part) {
@@ -123,11 +120,12 @@ void MultiCloneFilter::measureMotion(const OdometryIncrement& increment, double 
 }
 
 OdometryIncrement MultiCloneFilter::refined(const OdometryIncrement& increment, double yaw) const {
-  OdometryIncrement motion = calibrated(increment, yaw);
+  const WheelCalibration::Jacobian B = byCalibration(increment, yaw);
+  OdometryIncrement motion = calibrated(increment, B);
   Matrix3d& Q = motion.covariance;
-  if (calibration_error_ && increment.by_wheels) {
-    const Eigen::Matrix3Xd B = byCalibration(increment.before_from_after, yaw);
-    Q += symmetric(B * errors_.covariance(*calibration_error_) * B.transpose());
+  if (calibration_error_) {
+    const Eigen::Matrix3Xd by_estimated = B * calibrated_;
+    Q += symmetric(by_estimated * errors_.covariance(*calibration_error_) * by_estimated.transpose());
   }
   for (const MotionMeasurement& z : increment.measured) {
     Innovation::Vector r = z.value - z.seen * motion.before_from_after.vector();

@@ -11,6 +11,7 @@
 
 #include "sckf_odometry/experiments/complexity.h"
 #include "sckf_odometry/experiments/csv_file.h"
+#include "sckf_odometry/tools/command_line.h"
 #include "sckf_odometry/tools/experiment_arguments.h"
 #include "sckf_odometry/tools/number_option.h"
 #include "sckf_odometry/tools/progress_bar.h"
@@ -203,12 +204,7 @@ boost::program_options::options_description optionsFor(Arguments& a) {
 bool parse(int argc, char** argv, Arguments& arguments) {
   namespace po = boost::program_options;
   const po::options_description shown = optionsFor(arguments);
-  po::options_description all(shown);
-  all.add_options()("name", po::value(&arguments.name));
-  po::positional_options_description positional;
-  positional.add("name", 1);
-  po::variables_map values;
-  po::store(po::command_line_parser(argc, argv).options(all).positional(positional).run(), values);
+  po::variables_map values = parseCommandLine(argc, argv, shown, {{"name", &arguments.name}});
   if (values.count("help") != 0) {
     std::cout << "usage: experiment_data NAME --output DIR [options]\n\nNAME:";
     for (const auto& [name, experiment] : experiments()) std::cout << " " << name;

@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "sckf_odometry/core/se2.h"
+#include "sckf_odometry/tools/command_line.h"
 #include "sckf_odometry/tools/number_option.h"
 #include "sckf_odometry/tools/output_file.h"
 #include "sckf_odometry/tools/progress_bar.h"
@@ -255,12 +256,8 @@ std::optional<Options> parseOptions(int argc, char** argv) {
     ("base-frame", po::value(&options.base_frame)->default_value(options.base_frame), "")
     ("laser-frame", po::value(&options.laser_frame)->default_value(options.laser_frame), "");
   // clang-format on
-  po::options_description all(shown);
-  all.add_options()("rawlog", po::value(&options.rawlog))("bag", po::value(&options.bag));
-  po::positional_options_description positional;
-  positional.add("rawlog", 1).add("bag", 1);
-  po::variables_map values;
-  po::store(po::command_line_parser(argc, argv).options(all).positional(positional).run(), values);
+  po::variables_map values =
+      sckf::parseCommandLine(argc, argv, shown, {{"rawlog", &options.rawlog}, {"bag", &options.bag}});
   if (values.count("help") != 0) {
     std::cout
         << "usage: rawlog_to_bag RAWLOG BAG [options]\n\n"

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "sckf_odometry/ros/parameter_source.h"
+#include "sckf_odometry/tools/command_line.h"
 #include "sckf_odometry/tools/number_option.h"
 #include "sckf_odometry/tools/output_file.h"
 #include "sckf_odometry/tools/topic_option.h"
@@ -51,12 +52,7 @@ std::optional<ReplayArguments> parseReplayArguments(int argc, char** argv) {
      "with the parameter use_pose_updates")
     ("imu-topic", po::value(&arguments.imu_topic)->default_value(arguments.imu_topic), "with the parameter use_imu");
   // clang-format on
-  po::options_description all(shown);
-  all.add_options()("bag", po::value(&arguments.bag));
-  po::positional_options_description positional;
-  positional.add("bag", 1);
-  po::variables_map values;
-  po::store(po::command_line_parser(argc, argv).options(all).positional(positional).run(), values);
+  po::variables_map values = parseCommandLine(argc, argv, shown, {{"bag", &arguments.bag}});
   if (values.count("help") != 0) {
     std::cout << "usage: replay BAG --trajectory OUT.tum [options]\n\n"
                  "Runs a bag through the very pipeline that the nodelet runs, as fast as it goes.\n\n"

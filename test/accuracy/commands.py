@@ -10,17 +10,8 @@ import rosbag
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
 from programs import ProgramError  # noqa: E402
+from recording import opened  # noqa: E402
 from trajectory import TrajectoryError  # noqa: E402
-
-
-@contextmanager
-def opened(bag: Path) -> Iterator[rosbag.Bag]:
-    """A bag to read; a TrajectoryError where it is none."""
-    try:
-        with rosbag.Bag(str(bag)) as source:
-            yield source
-    except (OSError, rosbag.ROSBagException) as error:
-        raise TrajectoryError(f"{bag}: expected a bag: {getattr(error, 'strerror', None) or error}") from error
 
 
 def expect_another(output: Path, bag: Path) -> None:

@@ -25,9 +25,8 @@ def rename_topics(bag: str, output: str, names: Dict[str, str]) -> None:
                 out.write(names.get(topic, topic), message, stamp)
 
 
-class ScriptCase(unittest.TestCase):
-    """SCRIPT is the one under test."""
-    SCRIPT: str
+class FolderCase(unittest.TestCase):
+    """With a folder that is gone afterwards."""
     folder: tempfile.TemporaryDirectory[str]
 
     @classmethod
@@ -41,6 +40,11 @@ class ScriptCase(unittest.TestCase):
     @classmethod
     def path(cls, name: str) -> str:
         return str(Path(cls.folder.name) / name)
+
+
+class ScriptCase(FolderCase):
+    """SCRIPT is the one under test."""
+    SCRIPT: str
 
     def run_script(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         path = f"{BIN.parents[1]}:{os.environ.get('CMAKE_PREFIX_PATH', '')}"

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import tempfile
 import unittest
 from pathlib import Path
 from typing import List, Tuple
@@ -18,17 +17,17 @@ import rosbag
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "test" / "ros"), str(ROOT / "scripts")]
 import simulated_bag  # noqa: E402
+from script_case import FolderCase  # noqa: E402
 from trajectory import Trajectory, write_tum  # noqa: E402
 
 DURATION = 6.0
 
 
-class CommandsTest(unittest.TestCase):
-    folder: tempfile.TemporaryDirectory[str]
+class CommandsTest(FolderCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        cls.folder = tempfile.TemporaryDirectory()
+        super().setUpClass()
         simulated_bag.write(cls.path("drive.bag"), duration=DURATION)
         stamps = np.array([stamp for topic, _, stamp in simulated_bag.messages(DURATION) if topic == "/scan"])
         poses = simulated_bag.true_trajectory(stamps)
@@ -36,14 +35,6 @@ class CommandsTest(unittest.TestCase):
         write_tum(cls.path("later.tum"), Trajectory(stamps + 500.0, poses))
         rosbag.Bag(cls.path("nothing.bag"), "w").close()
         Path(cls.path("empty")).touch()
-
-    @classmethod
-    def tearDownClass(cls) -> None:
-        cls.folder.cleanup()
-
-    @classmethod
-    def path(cls, name: str) -> str:
-        return str(Path(cls.folder.name) / name)
 
     def refused(self, command: str, *arguments: str) -> Tuple[int, str]:
         """The exit code, and the line that it says last; of its outputs out.bag and out.tum there is none."""

@@ -82,10 +82,9 @@ class MultiCloneFilter : public LandmarkStates {
   // The motion (multi_clone_filter_motion.cpp).
   void beginCalibration(const std::optional<WheelCalibration>& known);
   Eigen::MatrixXd calibrationCovarianceAtFirst() const;
-  OdometryIncrement calibrated(const OdometryIncrement& increment, double yaw) const;
-  Eigen::Matrix3Xd byCalibration(const SE2& motion, double yaw) const;
+  OdometryIncrement calibrated(const OdometryIncrement& increment, const WheelCalibration::Jacobian& B) const;
   void turnCalibration(double yaw, Part world_error);
-  void measureMotion(const OdometryIncrement& motion, double yaw, const Eigen::Matrix3d& W);
+  void measureMotion(const OdometryIncrement& increment, const WheelCalibration::Jacobian& B, const Eigen::Matrix3d& W);
   void forgetCalibration();
 
   // What corrects it (multi_clone_filter.cpp).
