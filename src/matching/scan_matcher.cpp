@@ -124,19 +124,18 @@ Match ScanMatcher::matchNear(const PreparedScan& reference, const PreparedScan& 
   return refinedByReturn(concluded(aligned, options_), reference, current, options_);
 }
 
-double ScanMatcher::loss(const PreparedScan& reference, const PreparedScan& current,
-                         const SE2& reference_from_current) const {
-  const double max_distance = options_.pairs.max_distance;
-  return AlignmentProblem(reference, current, reference_from_current, max_distance, options_.pairs)
-      .loss(reference_from_current);
+Fit ScanMatcher::fit(const PreparedScan& reference, const PreparedScan& current,
+                     const SE2& reference_from_current) const {
+  const AlignmentProblem there(reference, current, reference_from_current, options_.pairs.max_distance, options_.pairs);
+  return {there.overlap(), there.agreement(), there.contradictions(), there.loss(reference_from_current)};
 }
 
 bool ScanMatcher::refutes(const PreparedScan& reference, const PreparedScan& current,
                           const SE2& reference_from_current) const {
   constexpr double kHardlyAny = 0.1;  // agreement
   constexpr double kMany = 0.25;      // of the points of one scan
-  const AlignmentProblem there(reference, current, reference_from_current, options_.pairs.max_distance, options_.pairs);
-  return there.agreement() < kHardlyAny && there.contradictions() > kMany * static_cast<double>(current.size());
+  const Fit there = fit(reference, current, reference_from_current);
+  return there.agreement < kHardlyAny && there.contradictions > kMany * static_cast<double>(current.size());
 }
 
 }  // namespace sckf

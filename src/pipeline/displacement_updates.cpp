@@ -97,7 +97,7 @@ bool DisplacementUpdates::fuse(ScanReport& report, FusionMethod& filter) {
   }
   report.outcome = ScanOutcome::kUpdated;
   const auto contradicts = [&report] { return report.innovation->nis() > report.nis_bound; };
-  const bool slipped = contradicts() && looksLikeSlip(report);
+  const bool slipped = contradicts() && looksLikeSlip(report) && !olderConfirmWheels(report, filter);
   if (slipped) {
     allowForSlip(filter, report.prediction.reference_from_current.translation().norm());
     report.innovation = filter.innovation(displacement);
@@ -220,9 +220,29 @@ bool DisplacementUpdates::tellsAgainst(const DisplacementPrediction& prediction,
   constexpr double kClearly = 50.0;
   const Displacement& z = *match.displacement;
   const PreparedScan& reference = references_[z.clone];
-  return matcher_.loss(reference, scan, prediction.reference_from_current) -
-             matcher_.loss(reference, scan, z.reference_from_current) >=
+  return matcher_.fit(reference, scan, prediction.reference_from_current).loss -
+             matcher_.fit(reference, scan, z.reference_from_current).loss >=
          kClearly;
+}
+
+/// Whether older references of whose place nobody doubts, and on which the scan lies well where the wheels tell, fit
+/// better there than at the match with the newest. A stair lies on the next one of a stairway, a column on the next
+/// one, but not from everywhere alike.
+bool DisplacementUpdates::olderConfirmWheels(const ScanReport& report, const FusionMethod& filter) const {
+  const SE2 predicted_from_matched =
+      between(report.prediction.reference_from_current, report.match.displacement->reference_from_current);
+  double for_the_match = 0.0;  // loss, as in tellsAgainst()
+  for (const std::size_t clone : references_.worthComparing(report.laser, filter, options_.reference)) {
+    const DisplacementPrediction prediction = filter.predictedDisplacementFrom(clone);
+    if (isVague(prediction)) continue;
+    const SE2& predicted = prediction.reference_from_current;
+    const Fit there = matcher_.fit(references_[clone], *report.scan, predicted);
+    if (there.overlap < options_.reference.older_min_overlap) continue;
+    if (there.agreement < options_.gate.doubtful_min_agreement) continue;
+    const SE2 matched = compose(predicted, predicted_from_matched);
+    for_the_match += there.loss - matcher_.fit(references_[clone], *report.scan, matched).loss;
+  }
+  return for_the_match < 0.0;
 }
 
 bool DisplacementUpdates::outweighsWheels(const Match& match) const {

@@ -165,8 +165,8 @@ class AllExperiments(unittest.TestCase):
             for one in each:
                 self.assertLess(n[f"{kind}both_position"], 0.9 * n[f"{kind}{one}_position"], n)
         for half in ("right", "left"):
-            # Not more: where the half views of the simulated stairs go wrong, either may.
-            self.assertLess(n["log_both_drift_percent"], 1.15 * n[f"log_{half}_drift_percent"], n)
+            # Where the half views of the simulated stairs go wrong, older scans do not.
+            self.assertLess(n["log_both_drift_percent"], 0.6 * n[f"log_{half}_drift_percent"], n)
         self.assertLess(n["log_uncut_drift_percent"], n["log_both_drift_percent"], "nothing is lost between its halves")
 
     def test_an_imu_holds_the_heading_where_scans_do_not(self) -> None:

@@ -679,5 +679,24 @@ TEST(Refutes, WhereScansCannotLieSo) {
   EXPECT_FALSE(matcher.refutes(*reference, *at(back), back)) << "who has turned round sees other trees";
 }
 
+TEST(Fits, BestWhereScansTrulyLie) {
+  SimulatedLaser laser;
+  laser.noise = 0.01;
+  std::mt19937_64 random(1);
+  const SE2 moved(0.3, 0.1, 0.2);
+  const auto reference = prepare(simulateScan(room(), SE2(), laser, &random), laser);
+  const auto current = prepare(simulateScan(room(), moved, laser, &random), laser);
+  const ScanMatcher matcher{MatcherOptions()};
+  const Fit there = matcher.fit(*reference, *current, moved);
+  const Fit elsewhere = matcher.fit(*reference, *current, corrected(moved, {0.0, 0.4, 0.0}));
+  EXPECT_GT(there.overlap, 0.95);
+  EXPECT_GT(there.agreement, 0.98);
+  EXPECT_LT(there.contradictions, 5);
+  EXPECT_LT(there.loss, 361.0) << "of residuals of one standard deviation half of that";
+  EXPECT_LT(elsewhere.agreement, 0.9);
+  EXPECT_GT(elsewhere.contradictions, 20);
+  EXPECT_GT(elsewhere.loss, 2.0 * there.loss);
+}
+
 }  // namespace
 }  // namespace sckf::test

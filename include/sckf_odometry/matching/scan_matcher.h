@@ -48,6 +48,14 @@ struct Match {
   ConstantEvidence sweep_duration;  ///< DisplacementEstimate::sweep_duration
 };
 
+/// Of two scans that lie somewhere: what AlignmentProblem has by these names.
+struct Fit {
+  double overlap = 0.0;    ///< share of the points of the current scan that have a partner, 0 to 1
+  double agreement = 0.0;  ///< 0 to 1
+  int contradictions = 0;  ///< points that are where the other scan has seen that nothing is
+  double loss = 0.0;       ///< of all points that both scans see: what does not fit
+};
+
 class ScanMatcher {
  public:
   explicit ScanMatcher(const MatcherOptions& options) : options_(options) {}
@@ -62,8 +70,8 @@ class ScanMatcher {
   Match matchNear(const PreparedScan& reference, const PreparedScan& current,
                   const DisplacementPrediction& prediction) const;
 
-  /// What both scans see that does not fit if they lie so: see AlignmentProblem::loss().
-  double loss(const PreparedScan& reference, const PreparedScan& current, const SE2& reference_from_current) const;
+  /// How the scans fall together if they lie so.
+  Fit fit(const PreparedScan& reference, const PreparedScan& current, const SE2& reference_from_current) const;
 
   /// Whether the scans cannot lie so: hardly a point has a partner, and many are where the other scan has seen that
   /// nothing is. Not if they just see nothing in common.

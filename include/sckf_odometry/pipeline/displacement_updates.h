@@ -21,7 +21,8 @@ struct GateOptions {
   double slip_max_misfit = 1.3;       ///< scans match well if Match::misfit is at most this …
   double slip_min_overlap = 0.6;  ///< … and where they see two directions only, this share of the points has a partner
   double doubtful_min_agreement = 0.85;  ///< agreement that a reference needs which could not be placed itself, and an
-                                         ///< older one that is found far from the prediction
+                                         ///< older one that is found far from the prediction, or tells that wheels that
+                                         ///< a match contradicts are right
 };
 
 struct DisplacementOptions {
@@ -78,6 +79,7 @@ class DisplacementUpdates {
   bool looksLikeSlip(const ScanReport& report) const;
   bool outweighsWheels(const Match& match) const;
   bool tellsAgainst(const DisplacementPrediction& prediction, const Match& match, const PreparedScan& scan) const;
+  bool olderConfirmWheels(const ScanReport& report, const FusionMethod& filter) const;
   bool matchesWell(const Match& match) const;
   bool isPlaced(const Match& match) const;
 
