@@ -138,13 +138,22 @@ class Views(unittest.TestCase):
         self.addCleanup(self.process.wait)
         self.addCleanup(self.process.send_signal, signal.SIGINT)
 
+    def saved_picture(self, name):
+        path = '/tmp/sckf_odometry_%s.png' % name
+        self.display.save(path)
+        return path
+
     def wait_until(self, condition, what):
         def holds():
             if self.process.poll() is not None:
-                self.said.seek(0)
-                self.fail('waited for %s, but the program has ended: %s' % (what, self.said.read()[-2000:]))
+                raise AssertionError('waited for %s, but the program has ended' % what)
             return condition()
-        helpers.wait_until(holds, what)
+        try:
+            helpers.wait_until(holds, what)
+        except AssertionError as error:
+            self.said.seek(0)
+            self.fail('%s; see %s. The program says: %s'
+                      % (error, self.saved_picture('waiting'), self.said.read()[-2000:]))
 
     def play_into(self, view):
         """The bag, into an rviz that runs and shows nothing yet."""
@@ -162,9 +171,8 @@ class Views(unittest.TestCase):
         while view.missing(self.display.picture()) and time.time() < end:
             time.sleep(0.5)
         picture = self.display.picture()
-        if view.missing(picture):
-            self.display.save('/tmp/sckf_odometry_%s.png' % name)
-        self.assertEqual(view.missing(picture), [], 'see /tmp/sckf_odometry_%s.png' % name)
+        missing = view.missing(picture)
+        self.assertEqual(missing, [], 'see ' + self.saved_picture(name) if missing else None)
         self.assertFalse(view.shows_error(picture), 'rviz says that a display has an error')
 
     def test_live(self):
