@@ -233,9 +233,7 @@ std::optional<Estimate> ScanOdometry::latest() const {
 
 bool ScanOdometry::setPose(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp) {
   checkPose(odom_from_base, covariance);
-  if (!filter_ && before_.calibration) {
-    before_.calibration = before_.calibration->turnedWithTheRobot(wrapAngle(odom_from_base.yaw - start_.yaw));
-  }
+  if (!filter_) turnFloor(odom_from_base.yaw - start_.yaw);
   start_ = odom_from_base;
   start_covariance_ = covariance;
   if (!filter_) return true;
@@ -272,11 +270,8 @@ void ScanOdometry::setOptions(const PipelineOptions& options) {
 void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp) {
   StateOptions states = statesFor(options_.calibration, options_.imu);
   before_ = found();
+  if (filter_) turnFloor(odom_from_base.yaw - filter_->pose().yaw);
   states.known_calibration = before_.calibration;
-  if (filter_ && before_.calibration) {  // what is told in x and y of the world
-    const double turned = wrapAngle(odom_from_base.yaw - filter_->pose().yaw);
-    states.known_calibration = before_.calibration->turnedWithTheRobot(turned);
-  }
   states.known_gyro_bias = before_.gyro_bias;
   const Eigen::Matrix3d P = withYawUpToATurn(symmetric(covariance));
   map_ = nullptr;
@@ -300,6 +295,11 @@ void ScanOdometry::begin(const SE2& odom_from_base, const Eigen::Matrix3d& covar
   landmarks_ = Landmarks(options_.landmarks);
   carried_on_.reset();
   carryOn();
+}
+
+/// What is known of it is told in x and y of odom, in which the robot is told to face elsewhere.
+void ScanOdometry::turnFloor(double yaw) {
+  if (before_.calibration) before_.calibration = before_.calibration->turnedWithTheRobot(wrapAngle(yaw));
 }
 
 Found ScanOdometry::found() const {

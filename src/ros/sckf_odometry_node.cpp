@@ -55,6 +55,7 @@ ScKfOdometryNode::ScKfOdometryNode(ros::NodeHandle nh, const ros::NodeHandle& pr
       tf_(options_.node.base_frame, options_.node.use_tf_odometry ? options_.node.tf_odometry_frame : "",
           toDuration(options_.node.time_jump)),
       publisher_(nh, options_.node),
+      second_parent_(options_.node),
       map_publisher_(nh, options_),
       debug_view_(nh, options_.node),
       status_publisher_(nh.advertise<sckf_odometry::Status>("status", kPublisherQueue)),
@@ -188,7 +189,7 @@ void ScKfOdometryNode::onTransforms(const ros::MessageEvent<const tf2_msgs::TFMe
       // What is published from here is known. Other nodelets have the same name, that of their manager.
       if (publisher == ros::this_node::getName() && publisher_.takeSent(transform)) continue;
       tf_.add(transform, is_static);
-      noteSecondParent(transform, publisher, is_static);
+      second_parent_.note(transform, publisher, is_static);
     }
     if (options_.node.use_tf_odometry) {
       for (const OdometrySample& sample : tf_.takeOdometry()) addOdometry(gate_.admit(sample));
@@ -376,21 +377,6 @@ void ScKfOdometryNode::keepPose() {
   if (!problem.empty()) warnings_.warn("state file", "~state_file not written: " + problem);
 }
 
-void ScKfOdometryNode::noteSecondParent(const geometry_msgs::TransformStamped& transform, const std::string& publisher,
-                                        bool is_static) {
-  const NodeOptions& node = options_.node;
-  const std::string& child = node.invert_odom_tf ? node.odom_frame : node.base_frame;
-  if (!node.publish_tf || second_parent_stays_ || frameName(transform.child_frame_id) != child) return;
-  const std::string parent = frameName(transform.header.frame_id);
-  // Old robot_state_publishers publish what is fixed on /tf: there its common name tells.
-  const bool is_fixed = !node.invert_odom_tf && (is_static || parent == "base_footprint");
-  second_parent_ = publisher + " publishes " + parent + " -> " + child +
-                   " on TF too, and a frame can have one parent only: set " +
-                   (is_fixed ? "~base_frame to \"" + parent + "\", which " + child + " is fixed to"
-                             : "~publish_tf to false, or ~odom_frame to a name of its own and ~invert_odom_tf to true");
-  second_parent_stays_ = is_static;
-}
-
 std::string ScKfOdometryNode::waitingFor() const {
   const NodeOptions& node = options_.node;
   if (!health_.odometry.anyUsed() && node.use_tf_odometry) {
@@ -413,8 +399,7 @@ void ScKfOdometryNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& sta
     using Level = diagnostic_msgs::DiagnosticStatus;
     Health::Conditions conditions;
     conditions.waiting_for = waitingFor();
-    conditions.second_parent = second_parent_;
-    if (!second_parent_stays_) second_parent_.clear();
+    conditions.second_parent = second_parent_.take();
     conditions.paused = paused_;
     conditions.scans_alone = pipeline_->onScansAlone();
     conditions.odometry_jumps = pipeline_->odometryJumps();

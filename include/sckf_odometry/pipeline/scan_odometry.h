@@ -106,6 +106,7 @@ class ScanOdometry {
 
   // The way of a scan (scan_odometry.cpp).
   void begin(const SE2& odom_from_base, const Eigen::Matrix3d& covariance, Stamp stamp);
+  void turnFloor(double yaw);
   bool oldestHoldsBack() const;
   bool olderMayCome() const;
   ScanReport take(const WaitingScans::Entry& waiting);

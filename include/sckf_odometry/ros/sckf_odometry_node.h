@@ -28,6 +28,7 @@
 #include "sckf_odometry/ros/parameters.h"
 #include "sckf_odometry/ros/pose_update_input.h"
 #include "sckf_odometry/ros/reconfigure.h"
+#include "sckf_odometry/ros/second_parent.h"
 #include "sckf_odometry/ros/services.h"
 #include "sckf_odometry/ros/state_file.h"
 #include "sckf_odometry/ros/tf_input.h"
@@ -87,7 +88,6 @@ class ScKfOdometryNode {
   void pause(bool paused);
   void keepPose();
 
-  void noteSecondParent(const geometry_msgs::TransformStamped& transform, const std::string& publisher, bool is_static);
   std::string waitingFor() const;  ///< empty if for nothing
 
   Options options_;
@@ -97,6 +97,7 @@ class ScKfOdometryNode {
   std::unique_ptr<ScanOdometry> pipeline_;
   TfInput tf_;
   EstimatePublisher publisher_;
+  SecondParent second_parent_;
   MapPublisher map_publisher_;
   DebugView debug_view_;
   ros::Publisher status_publisher_;
@@ -111,9 +112,7 @@ class ScKfOdometryNode {
     Scan message;
   };
   std::deque<ScanWithoutMount> scans_without_mount_;
-  std::string mount_problem_;         // of the newest scan that waits for its mount
-  std::string second_parent_;         // since the last report of the diagnostics
-  bool second_parent_stays_ = false;  // it is on /tf_static
+  std::string mount_problem_;  // of the newest scan that waits for its mount
   bool paused_ = false;
 
   // What calls back comes last, so that it is the first to go.
