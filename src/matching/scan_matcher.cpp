@@ -1,6 +1,7 @@
 #include "sckf_odometry/matching/scan_matcher.h"
 
 #include <Eigen/Cholesky>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -136,6 +137,22 @@ bool ScanMatcher::refutes(const PreparedScan& reference, const PreparedScan& cur
   constexpr double kMany = 0.25;      // of the points of one scan
   const Fit there = fit(reference, current, reference_from_current);
   return there.agreement < kHardlyAny && there.contradictions > kMany * static_cast<double>(current.size());
+}
+
+bool ScanMatcher::standsOut(const PreparedScan& reference, const PreparedScan& current,
+                            const SE2& reference_from_current) const {
+  constexpr double kFarBetter = 0.4;  // of the loss elsewhere: trees have 0.4 at most, crowds 0.5 and more
+  constexpr double kAside = 0.7;      // [m], farther than points are paired
+  constexpr double kTurned = 0.25;    // [rad]
+  const std::array<Eigen::Vector3d, 4> steps = {Eigen::Vector3d(kAside, 0.0, 0.0), Eigen::Vector3d(0.0, kAside, 0.0),
+                                                Eigen::Vector3d(0.0, 0.0, kTurned),
+                                                Eigen::Vector3d(0.0, 0.0, 2.0 * kTurned)};
+  const auto loss = [&](const SE2& at) { return fit(reference, current, at).loss; };
+  double elsewhere = 0.0;
+  for (const Eigen::Vector3d& step : steps) {
+    elsewhere += loss(corrected(reference_from_current, step)) + loss(corrected(reference_from_current, -step));
+  }
+  return loss(reference_from_current) < kFarBetter * elsewhere / (2.0 * static_cast<double>(steps.size()));
 }
 
 }  // namespace sckf

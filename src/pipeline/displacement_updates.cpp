@@ -113,13 +113,15 @@ bool DisplacementUpdates::fuse(ScanReport& report, FusionMethod& filter) {
 }
 
 /// A reference that could not be placed itself may be a crowd, of which the next scan sees half elsewhere: scans have
-/// to agree better than others. But where they never do, as in falling snow, that is what the place looks like, and
-/// after some time they count as they are.
+/// to agree better than others, or far better than anywhere near, as where a few trees are all that is seen. But where
+/// they never do, as in falling snow, that is what the place looks like, and after some time they count as they are.
 bool DisplacementUpdates::isDoubtful(const ScanReport& report) const {
   constexpr int kMany = 20;                  // scans in a row that were placed by no reference …
   constexpr std::chrono::seconds kLong(20);  // … for so long
   const Laser& laser = lasers_[report.laser];
   if (laser.failures == 0 || report.match.agreement >= options_.gate.doubtful_min_agreement) return false;
+  const Displacement& z = *report.match.displacement;
+  if (matcher_.standsOut(references_[z.clone], *report.scan, z.reference_from_current)) return false;
   return laser.failures < kMany || (laser.placed && report.stamp < *laser.placed + Stamp(kLong));
 }
 

@@ -91,6 +91,11 @@ class PlacesTest(unittest.TestCase):
         """Scans that agree badly place the robot where they refute what the wheels tell."""
         self.check("campus", "freezing", 0.45, 0.009, 15.0)
 
+    def test_wheels_that_slip_where_a_few_trees_are_seen_twice(self) -> None:
+        """In a turn no scan fits, and the next ones agree badly with that one, but nowhere else at all."""
+        self.check("campus", "slipping", 0.5, 0.012, 12.0)
+        self.check("campus", "freezing", 0.7, 0.015, 15.0, seed=2)
+
     def test_somebody_who_walks_before_the_robot_does_not_hold_it(self) -> None:
         self.simulate("bare", step=0.2, laser=Laser(beams=361, reach=12.0), somebody="ahead")
         estimate = self.drifted().translation_percent

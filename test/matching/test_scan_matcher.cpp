@@ -679,6 +679,43 @@ TEST(Refutes, WhereScansCannotLieSo) {
   EXPECT_FALSE(matcher.refutes(*reference, *at(back), back)) << "who has turned round sees other trees";
 }
 
+/// People all around, each six beams wide.
+std::shared_ptr<const PreparedScan> crowd(const SimulatedLaser& laser, std::mt19937_64& random) {
+  std::uniform_real_distribution<double> distance(0.3, 2.5);
+  LaserScan scan = simulateScan(room(), SE2(), laser, &random);
+  for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
+    scan.ranges[i] = i % 6 == 0 ? static_cast<float>(distance(random)) : scan.ranges[i - 1];
+  }
+  return prepare(scan, laser);
+}
+
+TEST(StandsOut, WhatIsSeenAgainAndNotACrowd) {
+  SimulatedLaser laser;
+  laser.noise = 0.01;
+  std::mt19937_64 random(1);
+  const SE2 moved(0.5, 0.1, 0.3);
+  const ScanMatcher matcher{MatcherOptions()};
+  for (const World& world : {trees(), room()}) {
+    const auto reference = prepare(simulateScan(world, SE2(), laser, &random), laser);
+    const auto current = prepare(simulateScan(world, moved, laser, &random), laser);
+    EXPECT_TRUE(matcher.standsOut(*reference, *current, moved));
+    EXPECT_FALSE(matcher.standsOut(*reference, *current, corrected(moved, {0.0, 0.5, 0.2})));
+  }
+  MatcherOptions whatever;
+  whatever.min_agreement = 0.0;
+  int matched = 0;
+  for (int i = 0; i < 20; ++i) {
+    const auto reference = crowd(laser, random);
+    const auto current = crowd(laser, random);
+    const Match match =
+        ScanMatcher(whatever).match(*reference, *current, {moved, Eigen::Vector3d(0.25, 0.25, 0.25).asDiagonal()});
+    if (!match.displacement) continue;
+    ++matched;
+    EXPECT_FALSE(matcher.standsOut(*reference, *current, match.displacement->reference_from_current)) << i;
+  }
+  EXPECT_GT(matched, 10) << "somehow";
+}
+
 TEST(Fits, BestWhereScansTrulyLie) {
   SimulatedLaser laser;
   laser.noise = 0.01;

@@ -333,12 +333,12 @@ TEST(ScanOdometryFaults, FindsBackFromAReferenceInAnotherPlace) {
   expectRecovers(driven, 2200, 0.06);
 }
 
-/// Snow, seen by every fifth beam, is none of the room, nor where it was at the next scan.
+/// Snow, seen by three of ten beams, is none of the room, nor where it was at the next scan.
 LaserScan inSnow(LaserScan scan, int ms) {
   std::mt19937_64 random(static_cast<std::uint64_t>(ms));
   std::uniform_real_distribution<double> share(0.0, 1.0);
   for (float& range : scan.ranges) {
-    if (share(random) < 0.2) range = static_cast<float>(0.3 + (range - 0.3) * share(random));
+    if (share(random) < 0.3) range = static_cast<float>(0.3 + (range - 0.3) * share(random));
   }
   return scan;
 }

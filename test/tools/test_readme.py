@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""What the README says to those who come from other packages: the names are those of the package as it is."""
+"""What the README says of parameters, and to those who come from other packages: it is so in the package as it is."""
 from __future__ import annotations
 
 import re
 import unittest
 from pathlib import Path
-from typing import Dict, List, Set
+from typing import Dict, Iterator, List, Set
 
 import yaml
 
@@ -22,12 +22,23 @@ def rows() -> List[List[str]]:
     return [row for row in cells if "`" in row[0]]
 
 
+def tables() -> Iterator[List[List[str]]]:
+    """The cells of each table, its heading first."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    for table in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):
+        yield [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in table.splitlines()]
+
+
 def names(cell: str) -> Set[str]:
     return set(re.findall(r"`([a-z_0-9]+)`", cell))
 
 
+def defaults() -> Dict[str, object]:
+    return yaml.safe_load((ROOT / "config" / "sckf_odometry.yaml").read_text(encoding="utf-8"))
+
+
 def parameters() -> Set[str]:
-    return set(yaml.safe_load((ROOT / "config" / "sckf_odometry.yaml").read_text(encoding="utf-8")))
+    return set(defaults())
 
 
 def aliases() -> Dict[str, str]:
@@ -59,6 +70,21 @@ class ReadmeTest(unittest.TestCase):
         for row in rows():
             if row[1].startswith("the same (") or row[1] == "the same" and "topic" not in row[0]:
                 self.assertLessEqual(names(row[0]), parameters(), row)
+
+    def test_each_row_of_a_table_has_the_cells_of_its_heading(self) -> None:
+        self.assertGreater(len(list(tables())), 10)
+        for heading, *others in tables():
+            for row in others:
+                self.assertEqual(len(row), len(heading), row)
+
+    def test_the_defaults_that_it_tells_are_those(self) -> None:
+        [(_, _, *told)] = [table for table in tables() if table[0][:2] == ["parameter", "default"]]
+        self.assertGreater(len(told), 10)
+        for name_cell, value_cell, _ in told:
+            for name, value in zip(re.findall(r"`(\w+)`", name_cell), re.split(r", (?![^\[]*\])", value_cell)):
+                default = defaults()[name]
+                self.assertEqual(yaml.safe_load(value if isinstance(default, (str, list)) else value.split()[0]), default,
+                                 name)
 
     def test_the_examples_that_it_names_are_there(self) -> None:
         text = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -77,6 +77,10 @@ class ScanMatcher {
   /// nothing is. Not if they just see nothing in common.
   bool refutes(const PreparedScan& reference, const PreparedScan& current, const SE2& reference_from_current) const;
 
+  /// Whether the scans fall together there far better than a little aside, or turned. Scans of a crowd, and of anything
+  /// dense, fall together in part wherever they are laid.
+  bool standsOut(const PreparedScan& reference, const PreparedScan& current, const SE2& reference_from_current) const;
+
  private:
   MatcherOptions options_;
 };
