@@ -214,17 +214,25 @@ bool DisplacementUpdates::looksLikeSlip(const ScanReport& report) const {
 }
 
 /// Whether both scans see enough that speaks for the match and against the prediction. Where a laser sees little, a
-/// short wall falls on another one somewhere, perfectly, and nothing speaks against either place.
+/// short wall falls on another one somewhere, perfectly, and nothing speaks against either place. But one place may
+/// fall on another one by chance, and not several at once, as trees do.
 bool DisplacementUpdates::tellsAgainst(const DisplacementPrediction& prediction, const Match& match,
                                        const PreparedScan& scan) const {
   // Loss, of which four neighbouring points tell as much as one: e^12 to 1 against the prediction, as a slip is one of
   // hundreds of scans, and a search looks at thousands of places.
   constexpr double kClearly = 50.0;
+  constexpr double kSeveral = 0.5;       // DecisivePlace::share(): more places than one decide if that one has less
+  constexpr double kPerfectly = 0.95;    // agreement
+  constexpr double kForEachPoint = 1.0;  // loss of one that has a partner at the match, and none where it is predicted
   const Displacement& z = *match.displacement;
   const PreparedScan& reference = references_[z.clone];
-  return matcher_.fit(reference, scan, prediction.reference_from_current).loss -
-             matcher_.fit(reference, scan, z.reference_from_current).loss >=
-         kClearly;
+  const Fit predicted = matcher_.fit(reference, scan, prediction.reference_from_current);
+  const Fit found = matcher_.fit(reference, scan, z.reference_from_current);
+  double evidence = predicted.loss - found.loss;
+  if (z.dimension() == 3 && match.decisive.share() < kSeveral && match.agreement >= kPerfectly) {
+    evidence += kForEachPoint * (found.overlap - predicted.overlap) * static_cast<double>(scan.size());
+  }
+  return evidence >= kClearly;
 }
 
 /// Whether older references of whose place nobody doubts, and on which the scan lies well where the wheels tell, fit

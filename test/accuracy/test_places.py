@@ -96,6 +96,13 @@ class PlacesTest(unittest.TestCase):
         self.check("campus", "slipping", 0.5, 0.012, 12.0)
         self.check("campus", "freezing", 0.7, 0.015, 15.0, seed=2)
 
+    def test_wheels_that_slip_where_nothing_is_seen_between_the_trees(self) -> None:
+        """Of a beam that meets nothing no free space is known: nothing tells against the wheels but trees that fall on trees."""
+        self.simulate("campus", "slipping", Laser(beams=361, reach=30.0), seed=2)
+        estimate = self.drifted().translation_percent
+        print(f"\ncampus, slipping wheels, 30 m of reach: {estimate:.2f} %")
+        self.assertLess(estimate, 0.45)
+
     def test_somebody_who_walks_before_the_robot_does_not_hold_it(self) -> None:
         self.simulate("bare", step=0.2, laser=Laser(beams=361, reach=12.0), somebody="ahead")
         estimate = self.drifted().translation_percent
