@@ -120,9 +120,9 @@ bool DisplacementUpdates::isDoubtful(const ScanReport& report) const {
   constexpr std::chrono::seconds kLong(20);  // … for so long
   const Laser& laser = lasers_[report.laser];
   if (laser.failures == 0 || report.match.agreement >= options_.gate.doubtful_min_agreement) return false;
+  if (laser.failures >= kMany && (!laser.placed || report.stamp >= *laser.placed + Stamp(kLong))) return false;
   const Displacement& z = *report.match.displacement;
-  if (matcher_.standsOut(references_[z.clone], *report.scan, z.reference_from_current)) return false;
-  return laser.failures < kMany || (laser.placed && report.stamp < *laser.placed + Stamp(kLong));
+  return !matcher_.standsOut(references_[z.clone], *report.scan, z.reference_from_current);
 }
 
 void DisplacementUpdates::becomeReference(ScanReport& report, FusionMethod& filter) {

@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <limits>
 
+#include "matching/crowd.h"
 #include "matching/simulated_world.h"
 #include "sckf_odometry/matching/scan_matcher.h"
 
@@ -679,16 +680,6 @@ TEST(Refutes, WhereScansCannotLieSo) {
   EXPECT_FALSE(matcher.refutes(*reference, *at(back), back)) << "who has turned round sees other trees";
 }
 
-/// People all around, each six beams wide.
-std::shared_ptr<const PreparedScan> crowd(const SimulatedLaser& laser, std::mt19937_64& random) {
-  std::uniform_real_distribution<double> distance(0.3, 2.5);
-  LaserScan scan = simulateScan(room(), SE2(), laser, &random);
-  for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
-    scan.ranges[i] = i % 6 == 0 ? static_cast<float>(distance(random)) : scan.ranges[i - 1];
-  }
-  return prepare(scan, laser);
-}
-
 TEST(StandsOut, WhatIsSeenAgainAndNotACrowd) {
   SimulatedLaser laser;
   laser.noise = 0.01;
@@ -705,8 +696,9 @@ TEST(StandsOut, WhatIsSeenAgainAndNotACrowd) {
   whatever.min_agreement = 0.0;
   int matched = 0;
   for (int i = 0; i < 20; ++i) {
-    const auto reference = crowd(laser, random);
-    const auto current = crowd(laser, random);
+    const LaserScan empty = simulateScan(room(), SE2(), laser);
+    const auto reference = prepare(amongPeople(empty, random), laser);
+    const auto current = prepare(amongPeople(empty, random), laser);
     const Match match =
         ScanMatcher(whatever).match(*reference, *current, {moved, Eigen::Vector3d(0.25, 0.25, 0.25).asDiagonal()});
     if (!match.displacement) continue;

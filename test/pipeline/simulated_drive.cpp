@@ -6,6 +6,7 @@
 
 #include "core/matrix_matchers.h"
 #include "core/random_inputs.h"
+#include "matching/crowd.h"
 
 namespace sckf::test {
 
@@ -63,17 +64,8 @@ LaserScan SimulatedDrive::scanAlong(const std::function<SE2(double)>& world_from
 }
 
 LaserScan scanOfACrowd(const SimulatedDrive& drive, int ms) {
-  constexpr std::size_t kWidth = 6;  // of a person, in beams
-  LaserScan scan = drive.scan(ms);
   std::mt19937_64 random(static_cast<std::uint64_t>(ms));
-  std::uniform_real_distribution<double> distance(0.3, 2.5);
-  std::normal_distribution<double> noise(0.0, 0.02);
-  double near = 0.0;
-  for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
-    if (i % kWidth == 0) near = distance(random);
-    scan.ranges[i] = static_cast<float>(near + noise(random));
-  }
-  return scan;
+  return amongPeople(drive.scan(ms), random);
 }
 
 ::testing::AssertionResult sound(const Estimate& estimate) {

@@ -19,6 +19,14 @@ geometry_msgs::TransformStamped transform(const std::string& parent, const std::
   return transform;
 }
 
+/// What is told if a node publishes one parent of one frame on /tf.
+std::string told(const NodeOptions& options, const std::string& parent, const std::string& child,
+                 const std::string& publisher) {
+  SecondParent second(options);
+  second.note(transform(parent, child), publisher, false);
+  return second.take();
+}
+
 TEST(SecondParent, IsToldOnceForEachTimeThatItIsSeen) {
   SecondParent second{NodeOptions()};
   EXPECT_EQ(second.take(), "");
@@ -38,9 +46,8 @@ TEST(SecondParent, OnTfStaticStays) {
 }
 
 TEST(SecondParent, IsFixedOnTfTooIfItIsTheFootprint) {
-  SecondParent second{NodeOptions()};
-  second.note(transform("base_footprint", "base_link"), "/robot_state_publisher", false);
-  EXPECT_THAT(second.take(), HasSubstr("~base_frame to \"base_footprint\""));
+  EXPECT_THAT(told({}, "base_footprint", "base_link", "/robot_state_publisher"),
+              HasSubstr("~base_frame to \"base_footprint\""));
 }
 
 TEST(SecondParent, IsNoneOfAnotherFrame) {
@@ -53,19 +60,15 @@ TEST(SecondParent, IsNoneOfAnotherFrame) {
 TEST(SecondParent, MattersOnlyIfTheTransformIsPublished) {
   NodeOptions options;
   options.publish_tf = false;
-  SecondParent second(options);
-  second.note(transform("odom", "base_link"), "/driver", false);
-  EXPECT_EQ(second.take(), "");
+  EXPECT_EQ(told(options, "odom", "base_link", "/driver"), "");
 }
 
 TEST(SecondParent, IsOneOfOdomWhereTheTransformIsInverted) {
   NodeOptions options;
   options.invert_odom_tf = true;
-  SecondParent second(options);
-  second.note(transform("odom", "base_link"), "/driver", false);
-  EXPECT_EQ(second.take(), "") << "base_link has no parent from here then";
-  second.note(transform("map", "odom"), "/amcl", false);
-  EXPECT_THAT(second.take(), AllOf(HasSubstr("/amcl publishes map -> odom"), HasSubstr("~publish_tf to false")));
+  EXPECT_EQ(told(options, "odom", "base_link", "/driver"), "") << "base_link has no parent from here then";
+  EXPECT_THAT(told(options, "map", "odom", "/amcl"),
+              AllOf(HasSubstr("/amcl publishes map -> odom"), HasSubstr("~publish_tf to false")));
 }
 
 }  // namespace
