@@ -6,7 +6,6 @@
 #include <sstream>
 
 #include "sckf_odometry/core/covariance.h"
-#include "sckf_odometry/pipeline/chi_squared.h"
 #include "sckf_odometry/pipeline/stopwatch.h"
 
 namespace sckf {
@@ -52,11 +51,15 @@ void allowForCommonErrors(const ScanReport& report, double matching_common, Fusi
 }  // namespace
 
 DisplacementUpdates::DisplacementUpdates(const DisplacementOptions& options, std::size_t lasers)
-    : options_(options), matcher_(options.matcher), lasers_(lasers, Laser(options.reference)) {}
+    : options_(options),
+      matcher_(options.matcher),
+      gate_(options.gate, matcher_),
+      lasers_(lasers, Laser(options.reference)) {}
 
 void DisplacementUpdates::setOptions(const DisplacementOptions& options) {
   options_ = options;
   matcher_ = ScanMatcher(options.matcher);
+  gate_ = DisplacementGate(options.gate, matcher_);
   for (Laser& laser : lasers_) laser.policy.setOptions(options.reference);
 }
 
@@ -88,16 +91,18 @@ void DisplacementUpdates::update(ScanReport& report, FusionMethod& filter) {
 
 bool DisplacementUpdates::fuse(ScanReport& report, FusionMethod& filter) {
   const Displacement& displacement = *report.match.displacement;
+  const Comparison comparison{references_[displacement.clone], *report.scan, report.prediction.reference_from_current,
+                              report.match};
   report.innovation = filter.innovation(displacement);
-  report.nis_bound = bound(displacement);
-  if (isDoubtful(report)) {
+  report.nis_bound = gate_.bound(displacement);
+  if (isDoubtful(report, comparison)) {
     report.outcome = ScanOutcome::kGated;
     report.reason = describeDoubt(report.match.agreement, options_.gate.doubtful_min_agreement);
     return false;
   }
   report.outcome = ScanOutcome::kUpdated;
   const auto contradicts = [&report] { return report.innovation->nis() > report.nis_bound; };
-  const bool slipped = contradicts() && looksLikeSlip(report) && !olderConfirmWheels(report, filter);
+  const bool slipped = contradicts() && gate_.looksLikeSlip(comparison) && !olderConfirmWheels(report, filter);
   if (slipped) {
     allowForSlip(filter, report.prediction.reference_from_current.translation().norm());
     report.innovation = filter.innovation(displacement);
@@ -115,14 +120,13 @@ bool DisplacementUpdates::fuse(ScanReport& report, FusionMethod& filter) {
 /// A reference that could not be placed itself may be a crowd, of which the next scan sees half elsewhere: scans have
 /// to agree better than others, or far better than anywhere near, as where a few trees are all that is seen. But where
 /// they never do, as in falling snow, that is what the place looks like, and after some time they count as they are.
-bool DisplacementUpdates::isDoubtful(const ScanReport& report) const {
+bool DisplacementUpdates::isDoubtful(const ScanReport& report, const Comparison& comparison) const {
   constexpr int kMany = 20;                  // scans in a row that were placed by no reference …
   constexpr std::chrono::seconds kLong(20);  // … for so long
   const Laser& laser = lasers_[report.laser];
-  if (laser.failures == 0 || report.match.agreement >= options_.gate.doubtful_min_agreement) return false;
+  if (laser.failures == 0) return false;
   if (laser.failures >= kMany && (!laser.placed || report.stamp >= *laser.placed + Stamp(kLong))) return false;
-  const Displacement& z = *report.match.displacement;
-  return !matcher_.standsOut(references_[z.clone], *report.scan, z.reference_from_current);
+  return gate_.isDoubtful(comparison);
 }
 
 void DisplacementUpdates::becomeReference(ScanReport& report, FusionMethod& filter) {
@@ -138,7 +142,7 @@ void DisplacementUpdates::compareWithOlder(ScanReport& report, FusionMethod& fil
     const std::optional<Displacement> displacement = displacementFrom(clone, report, filter);
     if (!displacement) continue;
     const Innovation innovation = filter.innovation(*displacement);
-    if (innovation.nis() > bound(*displacement)) continue;
+    if (innovation.nis() > gate_.bound(*displacement)) continue;
     filter.update(*displacement, innovation);
     ++report.older_references;
     lasers_[report.laser].place(report.stamp);
@@ -154,8 +158,9 @@ std::optional<Displacement> DisplacementUpdates::displacementFrom(std::size_t cl
   Match match = matchWithOlder(references_[clone], *report.scan, prediction, placed);
   if (!match.displacement || match.overlap < options_.reference.older_min_overlap) return std::nullopt;
   match.displacement->clone = clone;
-  if (!placed && !outweighsWheels(match)) return std::nullopt;
-  if (isFar(match, prediction) && !tellsAgainst(prediction, match, *report.scan)) return std::nullopt;
+  if (!placed && !gate_.outweighsWheels(match)) return std::nullopt;
+  const Comparison comparison{references_[clone], *report.scan, prediction.reference_from_current, match};
+  if (isFar(match, prediction) && !gate_.tellsAgainstPrediction(comparison)) return std::nullopt;
   Displacement& displacement = *match.displacement;
   displacement.matching_noise += (options_.reference.older_inflation - 1.0) * displacement.covariance();
   return std::move(match.displacement);
@@ -167,8 +172,7 @@ Match DisplacementUpdates::matchWithOlder(const PreparedScan& reference, const P
                                           const DisplacementPrediction& prediction, bool placed) const {
   if (placed && isVague(prediction)) {
     Match match = matcher_.match(reference, scan, prediction);
-    const bool agrees = match.agreement >= options_.gate.doubtful_min_agreement;
-    if (match.displacement && agrees && matchesWell(match)) return match;
+    if (match.displacement && gate_.agreesWell(match.agreement) && gate_.matchesWell(match)) return match;
   }
   return matcher_.matchNear(reference, scan, prediction);
 }
@@ -199,74 +203,24 @@ void DisplacementUpdates::allowForSlip(FusionMethod& filter, double way) const {
   filter.distrustWheels(std.cwiseAbs2().asDiagonal());
 }
 
-double DisplacementUpdates::bound(const Displacement& displacement) const {
-  return chiSquared(displacement.dimension(), options_.gate.probability);
-}
-
-/// Where the scans refute what the wheels tell these are wrong, and any match will do that has its place.
-bool DisplacementUpdates::looksLikeSlip(const ScanReport& report) const {
-  const Match& match = report.match;
-  const bool believed =
-      outweighsWheels(match) || (options_.gate.trust_scans_on_slip && isPlaced(match) &&
-                                 matcher_.refutes(references_[match.displacement->clone], *report.scan,
-                                                  report.prediction.reference_from_current));
-  return believed && tellsAgainst(report.prediction, match, *report.scan);
-}
-
-/// Whether both scans see enough that speaks for the match and against the prediction. Where a laser sees little, a
-/// short wall falls on another one somewhere, perfectly, and nothing speaks against either place. But one place may
-/// fall on another one by chance, and not several at once, as trees do.
-bool DisplacementUpdates::tellsAgainst(const DisplacementPrediction& prediction, const Match& match,
-                                       const PreparedScan& scan) const {
-  // Loss, of which four neighbouring points tell as much as one: e^12 to 1 against the prediction, as a slip is one of
-  // hundreds of scans, and a search looks at thousands of places.
-  constexpr double kClearly = 50.0;
-  constexpr double kSeveral = 0.5;       // DecisivePlace::share(): more places than one decide if that one has less
-  constexpr double kPerfectly = 0.95;    // agreement
-  constexpr double kForEachPoint = 1.0;  // loss of one that has a partner at the match, and none where it is predicted
-  const Displacement& z = *match.displacement;
-  const PreparedScan& reference = references_[z.clone];
-  const Fit predicted = matcher_.fit(reference, scan, prediction.reference_from_current);
-  const Fit found = matcher_.fit(reference, scan, z.reference_from_current);
-  double evidence = predicted.loss - found.loss;
-  if (z.dimension() == 3 && match.decisive.share() < kSeveral && match.agreement >= kPerfectly) {
-    evidence += kForEachPoint * (found.overlap - predicted.overlap) * static_cast<double>(scan.size());
-  }
-  return evidence >= kClearly;
-}
-
 /// Whether older references of whose place nobody doubts, and on which the scan lies well where the wheels tell, fit
 /// better there than at the match with the newest. A stair lies on the next one of a stairway, a column on the next
 /// one, but not from everywhere alike.
 bool DisplacementUpdates::olderConfirmWheels(const ScanReport& report, const FusionMethod& filter) const {
   const SE2 predicted_from_matched =
       between(report.prediction.reference_from_current, report.match.displacement->reference_from_current);
-  double for_the_match = 0.0;  // loss, as in tellsAgainst()
+  double for_the_match = 0.0;  // loss, as in tellsAgainstPrediction()
   for (const std::size_t clone : references_.worthComparing(report.laser, filter, options_.reference)) {
     const DisplacementPrediction prediction = filter.predictedDisplacementFrom(clone);
     if (isVague(prediction)) continue;
     const SE2& predicted = prediction.reference_from_current;
     const Fit there = matcher_.fit(references_[clone], *report.scan, predicted);
     if (there.overlap < options_.reference.older_min_overlap) continue;
-    if (there.agreement < options_.gate.doubtful_min_agreement) continue;
+    if (!gate_.agreesWell(there.agreement)) continue;
     const SE2 matched = compose(predicted, predicted_from_matched);
     for_the_match += there.loss - matcher_.fit(references_[clone], *report.scan, matched).loss;
   }
   return for_the_match < 0.0;
-}
-
-bool DisplacementUpdates::outweighsWheels(const Match& match) const {
-  return options_.gate.trust_scans_on_slip && matchesWell(match);
-}
-
-bool DisplacementUpdates::matchesWell(const Match& match) const {
-  return isPlaced(match) && match.misfit <= options_.gate.slip_max_misfit;
-}
-
-/// One wall lies on any other, however the robot is turned.
-bool DisplacementUpdates::isPlaced(const Match& match) const {
-  const Eigen::Index seen = match.displacement->dimension();
-  return seen == 3 || (seen == 2 && match.overlap >= options_.gate.slip_min_overlap);
 }
 
 }  // namespace sckf

@@ -38,9 +38,9 @@ class PlacesTest(unittest.TestCase):
         return result
 
     def check(self, place: str, wheels: str, percent: float, deg_per_m: float, of_wheels: float,
-              seed: int = SEED, laser: Laser = Laser()) -> float:
+              seed: int = SEED, laser: Laser = Laser(), step: float = 0.5) -> float:
         """The most that the estimate may drift, and the least that the wheels alone do. Returns what it does."""
-        self.simulate(place, wheels, laser, seed=seed)
+        self.simulate(place, wheels, laser, step, seed=seed)
         estimate, alone = self.drifted(), self.drifted("--method", "dead_reckoning")
         said = (f"{place}, wheels {wheels}: {estimate.translation_percent:.2f} %, {estimate.rotation_deg_per_m:.4f} °/m (at most "
                 f"{percent}, {deg_per_m}); wheels alone {alone.translation_percent:.2f} %")
@@ -99,6 +99,18 @@ class PlacesTest(unittest.TestCase):
     def test_wheels_that_slip_where_nothing_is_seen_between_the_trees(self) -> None:
         """Of a beam that meets nothing no free space is known: nothing tells against the wheels but trees that fall on trees."""
         self.check("campus", "slipping", 0.45, 0.008, 12.0, seed=2, laser=Laser(beams=361, reach=30.0))
+
+    def test_trees_of_which_hardly_a_half_is_seen_again(self) -> None:
+        """However near the robot is: most scans need no other reference for that."""
+        self.check("campus", "good", 0.55, 0.01, 0.3, seed=3, step=0.2)
+
+    def test_wheels_that_freeze_for_a_little_turn_are_found_out_by_several_trees(self) -> None:
+        """By so little at each scan that most of what is seen lies nearly as well where the wheels lead."""
+        self.check("campus", "freezing", 0.8, 0.014, 15.0, seed=3, step=0.2)
+
+    def test_wheels_that_freeze_where_a_few_trees_are_seen_in_passing(self) -> None:
+        """With 30 m of reach and a metre from scan to scan some thirty points are all there is."""
+        self.check("campus", "freezing", 1.3, 0.018, 12.0, seed=3, laser=Laser(reach=30.0), step=1.0)
 
     def test_somebody_who_walks_before_the_robot_does_not_hold_it(self) -> None:
         self.simulate("bare", step=0.2, laser=Laser(beams=361, reach=12.0), somebody="ahead")

@@ -6,24 +6,12 @@
 
 #include "sckf_odometry/core/fusion_method.h"
 #include "sckf_odometry/matching/scan_matcher.h"
+#include "sckf_odometry/pipeline/displacement_gate.h"
 #include "sckf_odometry/pipeline/reference_policy.h"
 #include "sckf_odometry/pipeline/reference_scans.h"
 #include "sckf_odometry/pipeline/scan_report.h"
 
 namespace sckf {
-
-/// What happens to a displacement that contradicts the wheels.
-struct GateOptions {
-  double probability = 0.999;         ///< χ² gate: an innovation less likely than 1 − this contradicts
-  bool trust_scans_on_slip = true;    ///< where the scans match well, put the contradiction down to the wheels
-  double slip_std_translation = 0.5;  ///< [m] by what, beside all their way, the wheels may be wrong then …
-  double slip_std_yaw = 0.5;          ///< [rad] … and in yaw
-  double slip_max_misfit = 1.3;       ///< scans match well if Match::misfit is at most this …
-  double slip_min_overlap = 0.6;  ///< … and where they see two directions only, this share of the points has a partner
-  double doubtful_min_agreement = 0.85;  ///< agreement that a reference needs which could not be placed itself, and an
-                                         ///< older one that is found far from the prediction, or tells that wheels that
-                                         ///< a match contradicts are right
-};
 
 struct DisplacementOptions {
   MatcherOptions matcher;
@@ -66,7 +54,7 @@ class DisplacementUpdates {
   };
 
   bool fuse(ScanReport& report, FusionMethod& filter);
-  bool isDoubtful(const ScanReport& report) const;
+  bool isDoubtful(const ScanReport& report, const Comparison& comparison) const;
   void allowForSlip(FusionMethod& filter, double way) const;
   void admitFailure(const ScanReport& report, FusionMethod& filter);
   bool othersTell(Stamp stamp) const;
@@ -75,16 +63,11 @@ class DisplacementUpdates {
                                                const FusionMethod& filter) const;
   Match matchWithOlder(const PreparedScan& reference, const PreparedScan& scan,
                        const DisplacementPrediction& prediction, bool placed) const;
-  double bound(const Displacement& displacement) const;  // a larger innovation, normalised and squared, contradicts
-  bool looksLikeSlip(const ScanReport& report) const;
-  bool outweighsWheels(const Match& match) const;
-  bool tellsAgainst(const DisplacementPrediction& prediction, const Match& match, const PreparedScan& scan) const;
   bool olderConfirmWheels(const ScanReport& report, const FusionMethod& filter) const;
-  bool matchesWell(const Match& match) const;
-  bool isPlaced(const Match& match) const;
 
   DisplacementOptions options_;
   ScanMatcher matcher_;
+  DisplacementGate gate_;
   ReferenceScans references_;
   std::vector<Laser> lasers_;
 };
