@@ -18,7 +18,8 @@ TIME_INCREMENT = 0.2 / 360  # [s]: a scan takes 0.2 s of the 0.23 s from one to 
 NAN = float('nan')
 WRONG = [-TIME_INCREMENT, 5.0 * TIME_INCREMENT, NAN, 1.5 * TIME_INCREMENT]  # negative, 1 s, none, longer than scans are apart
 NODES = {'deskewed': True, 'skewed': False, 'wrong': True, 'untold': True, 'switched': False}
-VIEWS = {'skewed': {'cloud_resolution': 0.5}, 'untold': {'visualization_rate': 0.0}}
+VIEWS = {'skewed': {'cloud_resolution': 0.5}, 'untold': {'visualization_rate': 0.0},
+         'wrong': {'path_max_poses': 10, 'cloud_max_points': 50}}
 SWITCHED = simulated_bag.START + 10.0  # the instant at which it is told to undo the motion, too
 
 
@@ -111,6 +112,14 @@ class Deskewing(unittest.TestCase):
         points = np.array(list(point_cloud2.read_points(cloud, field_names=('x', 'y'))))
         self.assertGreater(len(points), 20)
         self.assertEqual(len(np.unique(np.floor(points / VIEWS['skewed']['cloud_resolution']), axis=0)), len(points))
+
+    def test_views_are_no_larger_than_allowed(self):
+        allowed, others = self.recorders['wrong'], self.recorders['deskewed']
+        for topic in ('path', 'path_odometry'):
+            self.assertLessEqual(max(len(path.poses) for path in allowed.messages(topic)), 10 + 1, 'and the newest')
+            self.assertGreater(len(others.messages(topic)[-1].poses), 11, 'the drive is no test')
+        self.assertEqual(allowed.messages('cloud')[-1].width, 50)
+        self.assertGreater(others.messages('cloud')[-1].width, 50)
 
     def test_without_a_rate_there_are_no_views(self):
         for topic in ('path', 'path_odometry', 'cloud'):

@@ -19,6 +19,7 @@ SPEED = 10.0
 SEEING = 25.0  # [s] then the laser falls silent
 DURATION = 35.0
 STANDING = 5.0  # [s] at the end
+MAP = 'site'  # map_frame
 
 
 def standing(messages, begin):
@@ -61,9 +62,10 @@ def bad_pose_updates():
     rng = np.random.default_rng(6)
     no_stamp, other_frame, no_covariance = (simulated_bag.pose_update(0.0, rng) for _ in range(3))
     no_stamp.header.stamp = rospy.Time()
+    no_stamp.header.frame_id = no_covariance.header.frame_id = MAP
     other_frame.header.frame_id = 'world'
     no_covariance.pose.covariance = 36 * [0.0]
-    return [(no_stamp, 'header.stamp is 0'), (other_frame, 'header.frame_id is "world": "map" expected'),
+    return [(no_stamp, 'header.stamp is 0'), (other_frame, 'header.frame_id is "world": "%s" expected' % MAP),
             (no_covariance, 'a positive definite covariance expected')]
 
 
@@ -74,12 +76,16 @@ class OtherSensors(unittest.TestCase):
         cls.recorder = helpers.Recorder(in_map=True)
         cls.loader = helpers.load_nodelet(MANAGER, NODE, max_scan_delay=10000, use_imu=True,
                                           use_imu_orientation=True, imu_orientation_std=0.02, standstill_time=1.0,
-                                          odometry_yaw_per_meter=0.05, use_pose_updates=True, publish_map_tf=True)
+                                          odometry_yaw_per_meter=0.05, use_pose_updates=True, publish_map_tf=True,
+                                          map_frame=MAP)
         helpers.wait_for_subscriber('/scan')
         cls.recorder.wait_for_connection()
         cls.imu = simulated_bag.ImuUnit()
         everything = simulated_bag.messages(duration=DURATION, imu=cls.imu, poses=True)
-        beside = [message for topic, message, _ in everything if topic == '/pose_update'][7]
+        in_map = [message for topic, message, _ in everything if topic == '/pose_update']
+        for message in in_map:
+            message.header.frame_id = MAP
+        beside = in_map[7]
         beside.pose.pose.position.x += 3.0
         end = simulated_bag.START + SEEING
         cls.messages = [entry for entry in everything if entry[0] != '/scan' or entry[2] < end]
@@ -176,7 +182,7 @@ class OtherSensors(unittest.TestCase):
         self.assertGreater(len(messages), 0.9 * (SEEING - 4.0) / simulated_bag.SCAN_PERIOD)
         self.assertGreater(np.diff([m.header.stamp.to_nsec() for m in messages]).min(), 0)
         for message in messages:
-            self.assertEqual(message.header.frame_id, 'map')
+            self.assertEqual(message.header.frame_id, MAP)
             t = message.header.stamp.to_sec() - simulated_bag.START
             moved = simulated_bag.between(simulated_bag.truth(0.0), simulated_bag.truth(t))
             error = helpers.planar(message.pose.pose) - simulated_bag.compose(simulated_bag.MAP_FROM_ODOM, moved)
@@ -185,6 +191,7 @@ class OtherSensors(unittest.TestCase):
             self.assertTrue((std > 1e-4).all() and (std < 0.2).all(), std)
 
     def test_the_transforms_of_map_and_odom_give_the_pose_in_map(self):
+        self.assertEqual({t.header.frame_id for t in self.recorder.transforms(False) if t.child_frame_id == 'odom'}, {MAP})
         map_stamps, map_from_odom = self.transforms('odom')
         odom_stamps, odom_from_base = self.transforms('base_link')
         self.assertGreater(len(map_stamps), 50)
