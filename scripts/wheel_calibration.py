@@ -14,6 +14,10 @@ ROBUST = 2.0  # residuals of so many std weigh half: wheels that slip are nothin
 ITERATIONS = 20
 
 
+class CalibrationError(ValueError):
+    """What the displacements do not tell, and what is expected of them."""
+
+
 @dataclass(frozen=True)
 class Calibration:
     """errors: s and r, by which way and rotation are longer than the wheels say [1]; k, the rotation that goes with the
@@ -70,6 +74,10 @@ def _noise(wheels: np.ndarray, residual: np.ndarray, matching: np.ndarray) -> np
     for _ in range(ITERATIONS):
         expected = _variance(wheels, noise) + matching
         kept = np.all(residual ** 2 < 9.0 * expected, axis=1)
+        if not kept.any():
+            x, y, yaw = np.median(np.abs(residual), axis=0)
+            raise CalibrationError(f"wheels and scans contradict each other at each of {len(wheels)} displacements, by "
+                                   f"{x:.2g} m, {y:.2g} m, {yaw:.2g} rad (median): expected some that differ by what wheels err")
         found = []
         for axes in ((0, 1), (2,)):
             weight = np.concatenate([1.0 / expected[kept, axis] for axis in axes])

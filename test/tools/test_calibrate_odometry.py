@@ -19,7 +19,7 @@ sys.path[:0] = [str(ROOT / "test" / "ros"), str(ROOT / "test" / "accuracy"), str
 import simulated_bag  # noqa: E402
 from recording import halved  # noqa: E402
 from script_case import BIN, ScriptCase, rename_topics  # noqa: E402
-from wheel_calibration import calibrate  # noqa: E402
+from wheel_calibration import CalibrationError, calibrate  # noqa: E402
 from worse_wheels import worsen  # noqa: E402
 
 MATCHING = np.array([0.004, 0.004, 0.002])  # std of a displacement [m, m, rad]
@@ -79,6 +79,11 @@ class NumbersTest(unittest.TestCase):
         found = calibrate(wheels, scans, matching, headings)
         self.assertGreater(found.std[4], 0.02, "of the floor, which is not told")
         self.assertLess(found.std[0], 0.04, "of the way, which is, but for what a carpet may do")
+
+    def test_wheels_of_another_drive_are_refused(self) -> None:
+        wheels, scans, matching, headings = drive(self.ERRORS, self.NOISE, 6, pairs=50)
+        with self.assertRaisesRegex(CalibrationError, r"each of 50 displacements, by \S+ m, \S+ m, \S+ rad \(median\): expected"):
+            calibrate(wheels, scans + np.random.default_rng(6).choice([-5.0, 5.0], (50, 3)), matching, headings)
 
 
 def weaving(t: float) -> np.ndarray:
