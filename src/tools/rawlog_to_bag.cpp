@@ -213,7 +213,7 @@ void convert(const Options& options) {
 /// What is written replaces neither what is read nor each other.
 void checkFiles(const Options& options) {
   const auto check = [](const std::string& output, const std::string& other, const std::string& what) {
-    if (!output.empty() && (output == other || sckf::isSameFile(output, other))) {
+    if (sckf::isSameFile(output, other)) {
       throw boost::program_options::error(output + ": expected another file than " + what);
     }
   };

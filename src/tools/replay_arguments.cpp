@@ -64,12 +64,11 @@ std::optional<ReplayArguments> parseReplayArguments(int argc, char** argv) {
   if (arguments.trajectory.empty() && arguments.csv.empty()) throw po::error("--trajectory or --csv is needed");
   const std::vector<std::pair<std::string, std::string>> outputs{
       {"--trajectory", arguments.trajectory}, {"--csv", arguments.csv}, {"--map-trajectory", arguments.map_trajectory}};
+  std::vector<std::pair<std::string, std::string>> files = outputs;
+  files.insert(files.end(), {{"the bag", arguments.bag}, {"--params", arguments.params}});
   for (const auto& [option, path] : outputs) {
-    if (isSameFile(path, arguments.bag)) {
-      throw po::error(option + " " + path + ": expected another file than the bag");
-    }
-    for (const auto& [other, same] : outputs) {
-      if (option != other && !path.empty() && path == same) {
+    for (const auto& [other, same] : files) {
+      if (option != other && isSameFile(path, same)) {
         throw po::error(option + " " + path + ": expected another file than " + other);
       }
     }

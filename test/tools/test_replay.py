@@ -352,8 +352,15 @@ class ReplayTest(unittest.TestCase):
                 done = self.run_replay(self.bag, option, path)
                 self.assertEqual(done.returncode, 2)
                 self.assertIn(f"{option} {path}: expected another file than the bag", done.stderr)
-        done = self.run_replay(self.bag, "--csv", self.path("both"), "--trajectory", self.path("both"))
-        self.assertIn("expected another file than --", done.stderr)
+        both = self.path("both")
+        for same in (both, f"{both.parent}/./{both.name}", f"{both.parent}/none/../{both.name}"):
+            done = self.run_replay(self.bag, "--csv", both, "--trajectory", same)
+            self.assertIn("expected another file than --", done.stderr, same)
+        params = self.path("kept.yaml")
+        params.write_text("method: sckf\n")
+        done = self.run_replay(self.bag, "--csv", params, "--params", params)
+        self.assertEqual((done.returncode, params.read_text()), (2, "method: sckf\n"))
+        self.assertIn(f"--csv {params}: expected another file than --params", done.stderr)
         self.assertEqual(self.bag.read_bytes(), before)
 
     def test_what_a_link_leads_to_is_written_and_a_device_as_it_is(self) -> None:

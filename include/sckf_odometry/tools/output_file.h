@@ -68,10 +68,15 @@ class OutputFile {
   int error_ = 0;  // errno of what could not be written
 };
 
-/// Whether writing the one would replace the other.
+/// Whether writing the one would replace the other, or would if both were written. An empty path is no file.
 inline bool isSameFile(const std::string& a, const std::string& b) {
+  if (a.empty() || b.empty()) return false;
   std::error_code none_there;
-  return std::filesystem::equivalent(a, b, none_there);
+  if (std::filesystem::equivalent(a, b, none_there)) return true;
+  const auto written = [&none_there](const std::string& path) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(path), none_there);
+  };
+  return written(a) == written(b);
 }
 
 }  // namespace sckf
