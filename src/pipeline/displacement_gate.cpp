@@ -31,15 +31,15 @@ bool DisplacementGate::matchesWell(const Match& match) const {
 
 bool DisplacementGate::looksLikeSlip(const Comparison& comparison) const {
   const auto& [reference, scan, predicted, match] = comparison;
-  const bool believed =
-      outweighsWheels(match) || (options_.trust_scans_on_slip && isPlaced(match, options_.slip_min_overlap) &&
-                                 matcher_.refutes(reference, scan, predicted));
+  if (!options_.trust_scans_on_slip || !isPlaced(match, options_.slip_min_overlap)) return false;
+  const bool believed = match.misfit <= options_.slip_max_misfit || matcher_.refutes(reference, scan, predicted);
   return believed && tellsAgainstPrediction(comparison);
 }
 
 bool DisplacementGate::tellsAgainstPrediction(const Comparison& comparison) const {
   // Loss, of which four neighbouring points tell as much as one: e^12 to 1 against the prediction, as a slip is one of
-  // hundreds of scans, and a search looks at thousands of places; or as the innovation is unlikely enough by itself.
+  // hundreds of scans, and a search looks at thousands of places. That several things fall on each other tells most of
+  // it by itself: what else is seen has only not to tell for the wheels.
   constexpr double kClearly = 50.0;
   constexpr double kClearlyOfSeveral = 5.0;
   constexpr double kSeveral = 0.65;   // DecisivePlace::share(): more places than one decide if that one has less

@@ -26,6 +26,7 @@ struct Comparison {
   const Match& match;    ///< one with a displacement
 };
 
+/// Asks scans and matches only; what the filter knows, and what other references and lasers tell, is its user's.
 class DisplacementGate {
  public:
   DisplacementGate(const GateOptions& options, const ScanMatcher& matcher) : options_(options), matcher_(matcher) {}
@@ -39,7 +40,7 @@ class DisplacementGate {
   /// Whether scans may agree as they do and not belong together, as half of a crowd does that is laid on another half.
   bool isDoubtful(const Comparison& comparison) const;
 
-  /// Whether the scans match well enough for the match to be as good as any that does not contradict.
+  /// Whether points lie well on the whole, and where two directions are seen enough of them have a partner.
   bool matchesWell(const Match& match) const;
 
   /// … and are trusted more than the wheels.
