@@ -48,16 +48,19 @@ inline World withPolygon(World world, const std::vector<Eigen::Vector2d>& corner
   return world;
 }
 
+/// A leg or a trunk, nearly round.
+inline World withPost(World world, const Eigen::Vector2d& place, double radius) {
+  std::vector<Eigen::Vector2d> corners;
+  for (int k = 0; k < 8; ++k) {
+    const double angle = k * M_PI / 4.0;
+    corners.push_back(place + radius * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
+  }
+  return withPolygon(std::move(world), corners);
+}
+
 /// Two legs of somebody who stands there.
 inline World withSomebodyAt(World world, const Eigen::Vector2d& place) {
-  for (const double side : {-0.12, 0.12}) {
-    std::vector<Eigen::Vector2d> corners;
-    for (int k = 0; k < 8; ++k) {
-      const double angle = k * M_PI / 4.0;
-      corners.push_back(place + Eigen::Vector2d(0.07 * std::cos(angle), side + 0.07 * std::sin(angle)));
-    }
-    world = withPolygon(std::move(world), corners);
-  }
+  for (const double side : {-0.12, 0.12}) world = withPost(std::move(world), place + Eigen::Vector2d(0.0, side), 0.07);
   return world;
 }
 

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <utility>
 
 #include "matching/simulated_world.h"
 #include "sckf_odometry/pipeline/displacement_gate.h"
@@ -8,13 +9,7 @@
 namespace sckf::test {
 namespace {
 
-World post(const Eigen::Vector2d& place) {
-  World world;
-  std::vector<Eigen::Vector2d> corners;
-  for (int k = 0; k < 8; ++k)
-    corners.push_back(place + 0.2 * Eigen::Vector2d(std::cos(k * M_PI / 4.0), std::sin(k * M_PI / 4.0)));
-  return withPolygon({}, corners);
-}
+constexpr double kTrunk = 0.2;  // radius [m]
 
 /// Trunks all around, each seen by a few beams.
 World grove() {
@@ -22,19 +17,13 @@ World grove() {
   for (const Eigen::Vector2d& place :
        {Eigen::Vector2d(4, 1), Eigen::Vector2d(1, 5), Eigen::Vector2d(-3, 3), Eigen::Vector2d(-5, -1),
         Eigen::Vector2d(-1, -4), Eigen::Vector2d(5, -4), Eigen::Vector2d(2, -6), Eigen::Vector2d(6, 4)}) {
-    const World one = post(place);
-    world.insert(world.end(), one.begin(), one.end());
+    world = withPost(std::move(world), place, kTrunk);
   }
   return world;
 }
 
 /// Between two walls that tell no way along them, one post that does.
-World corridorWithPost() {
-  World world = corridor();
-  const World one = post({2.2, 0.8});
-  world.insert(world.end(), one.begin(), one.end());
-  return world;
-}
+World corridorWithPost() { return withPost(corridor(), {2.2, 0.8}, kTrunk); }
 
 /// Two scans of a world, matched.
 struct Seen {

@@ -13,8 +13,8 @@ namespace sckf {
 struct ReferenceOptions {
   double kf_dist_linear = 0.7;   ///< [m] largest way from the reference to a scan that is compared with it
   double kf_dist_angular = 0.5;  ///< [rad] largest rotation
-  double kf_min_overlap = 0.7;   ///< a share of points with a partner that is smaller than this times the largest of a
-                                 ///< scan with the reference makes the scan the new one
+  double kf_min_overlap = 0.7;   ///< a scan of which fewer points have a partner than this times the most that had one
+                                 ///< since the reference is kept becomes the new one
 
   // A scan that becomes a reference is compared with older ones too, where the method keeps more than one.
   int kept = 16;                    ///< references, the newest among them
@@ -39,8 +39,8 @@ class ReferencePolicy {
 
  private:
   ReferenceOptions options_;
-  SE2 last_;                 // reference_from_scan of the scan before
-  double most_overlap_ = 0;  // of a scan with the reference
+  SE2 last_;                   // reference_from_scan of the scan before
+  double most_overlap_ = 0.0;  // of a scan with the reference
 };
 
 }  // namespace sckf
