@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What the README says of parameters, and to those who come from other packages: it is so in the package as it is."""
+"""What the README and doc/ say of parameters, of files, and to those who come from other packages: it is so in the package."""
 from __future__ import annotations
 
 import re
@@ -10,23 +10,33 @@ from typing import Dict, Iterator, List, Set
 import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
+README = ROOT / "README.md"
+PAGES = [README, *sorted((ROOT / "doc").glob("*.md"))]
+LINK = re.compile(r"\]\((?!https?:)([^)#]*)(?:#([^)]*))?\)")
+FUSION_METHODS = ["sckf"]
 TOPIC_OR_SERVICE = re.compile(r"(?:topics?|services?|TF) (?:(?:, )?`[^`]*`)+(?: → `[^`]*`)?")
 
 
 def rows() -> List[List[str]]:
     """The cells of the tables in the sections "Coming from …", without their headings."""
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    text = README.read_text(encoding="utf-8")
     sections = re.findall(r"^## Coming from .*?(?=^## (?!Coming from))", text, re.MULTILINE | re.DOTALL)
     lines = "".join(sections).splitlines()
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("| ")]
     return [row for row in cells if "`" in row[0]]
 
 
-def tables() -> Iterator[List[List[str]]]:
+def tables(page: Path) -> Iterator[List[List[str]]]:
     """The cells of each table, its heading first."""
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    text = page.read_text(encoding="utf-8")
     for table in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):
         yield [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in table.splitlines()]
+
+
+def anchors(page: Path) -> Set[str]:
+    """Where a link to a page may lead: its headings, as GitHub writes them."""
+    headings = re.findall(r"^#+ (.*)", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 def names(cell: str) -> Set[str]:
@@ -72,13 +82,29 @@ class ReadmeTest(unittest.TestCase):
                 self.assertLessEqual(names(row[0]), parameters(), row)
 
     def test_each_row_of_a_table_has_the_cells_of_its_heading(self) -> None:
-        self.assertGreater(len(list(tables())), 10)
-        for heading, *others in tables():
+        all_tables = [table for page in PAGES for table in tables(page)]
+        self.assertGreater(len(all_tables), 15)
+        for heading, *others in all_tables:
             for row in others:
                 self.assertEqual(len(row), len(heading), row)
 
+    def test_what_pages_link_to_is_there(self) -> None:
+        self.assertGreater(len(PAGES), 3)
+        for page in PAGES:
+            for path, anchor in LINK.findall(page.read_text(encoding="utf-8")):
+                target = (page.parent / path).resolve() if path else page
+                self.assertTrue(target.exists(), f"{page.name}: {path}")
+                if anchor:
+                    self.assertIn(anchor, anchors(target), f"{page.name}: {path}#{anchor}")
+
+    def test_parameters_whose_choice_is_measured_are_some(self) -> None:
+        [table] = [table for table in tables(ROOT / "doc" / "accuracy.md") if table[0][0].startswith("what is different")]
+        told = {name for row in table[2:] for name in re.findall(r"`([a-z_]+[a-z])`", row[0])} - set(FUSION_METHODS)
+        self.assertGreater(len(told), 25)
+        self.assertLessEqual(told, parameters())
+
     def test_the_defaults_that_it_tells_are_those(self) -> None:
-        [(_, _, *told)] = [table for table in tables() if table[0][:2] == ["parameter", "default"]]
+        [(_, _, *told)] = [table for table in tables(README) if table[0][:2] == ["parameter", "default"]]
         self.assertGreater(len(told), 10)
         for name_cell, value_cell, _ in told:
             for name, value in zip(re.findall(r"`(\w+)`", name_cell), re.split(r", (?![^\[]*\])", value_cell)):
@@ -87,7 +113,7 @@ class ReadmeTest(unittest.TestCase):
                                  name)
 
     def test_the_examples_that_it_names_are_there(self) -> None:
-        text = (ROOT / "README.md").read_text(encoding="utf-8")
+        text = README.read_text(encoding="utf-8")
         told = set(re.findall(r"^\| `(\w+\.launch)", text, re.MULTILINE))
         self.assertEqual(told, {path.name for path in (ROOT / "config" / "examples").glob("*.launch")})
 
