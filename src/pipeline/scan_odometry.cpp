@@ -50,7 +50,7 @@ LaserConstants constantsOf(const PipelineOptions& options) {
 ScanOdometry::ScanOdometry(const PipelineOptions& options, const SE2& odom_from_base, const Eigen::Matrix3d& covariance,
                            const Found& before)
     : options_(options),
-      lasers_(options.lasers, {constantsOf(options), {}, std::nullopt}),
+      lasers_(options.lasers, {constantsOf(options), {}, {}, std::nullopt}),
       odometry_(options.motion, options.odometry_timeout),
       imu_(options.imu.timeout),
       twist_(options.twist_window),
@@ -155,6 +155,8 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   filter_->beginScan();
   useHeading(report);  // (34)
   report.wheels_known = std::exchange(wheels_known_, true);
+  laser.no_return.look(waiting.scan);
+  report.no_return = laser.no_return.value();
   report.scan = prepared(waiting, report.reason);
   if (report.scan) {
     correctBy(report);  // (16)-(23)
@@ -189,8 +191,10 @@ void ScanOdometry::useHeading(ScanReport& report) {
 
 std::shared_ptr<const PreparedScan> ScanOdometry::prepared(const WaitingScans::Entry& waiting,
                                                            std::string& rejection) const {
+  const Laser& laser = lasers_[waiting.laser];
   ScanOptions options = options_.scan;
-  options.range_offset = lasers_[waiting.laser].constants.range_offset.value();
+  options.range_max = std::min(options.range_max, laser.no_return.value());
+  options.range_offset = laser.constants.range_offset.value();
   options.sweep = evenSweep(waiting);
   return prepareScan(waiting.scan, waiting.base_from_laser, options, &rejection, motionDuring(waiting));
 }

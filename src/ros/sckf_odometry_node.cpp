@@ -287,6 +287,7 @@ void ScKfOdometryNode::account(const ScanReport& report) {
     warnings_.warn("scan " + outcome,
                    "scan on " + scan_topics_[report.laser] + " not used: " + outcome + ": " + report.reason);
   }
+  warnOfNoReturn(report);
   warnOfSkew(report);
   debug_view_.show(report);
   if (!report.estimate) return;
@@ -301,6 +302,18 @@ void ScKfOdometryNode::accountPoses(bool scans_were_taken) {
     // Scans tell more, and later: without them the poses themselves tell when.
     if (report.in_map && !scans_were_taken) map_publisher_.publish(*report.in_map);
   }
+}
+
+void ScKfOdometryNode::warnOfNoReturn(const ScanReport& report) {
+  if (report.no_return == ScanReport::kNever) return;
+  const std::string& topic = scan_topics_[report.laser];
+  std::ostringstream text;
+  text << "scan on " << topic << ": its driver writes " << report.no_return
+       << " m where the laser has seen nothing, and a larger range_max: readings of that and more are not used; "
+          "expected "
+          "range_max in the message, or ~range_max, to be "
+       << report.no_return;
+  warnings_.warnOnce("no return " + topic, text.str());
 }
 
 void ScKfOdometryNode::warnOfSkew(const ScanReport& report) {

@@ -30,7 +30,6 @@ SPEED = 0.5  # [m/s]
 ODOMETRY = 4  # messages from scan to scan
 MOUNT = Mount(x=0.1, z=0.3)
 SEED = 7
-NO_RETURN = 81.9  # [m] as CARMEN's lasers say it
 
 
 @dataclass(frozen=True)
@@ -57,6 +56,7 @@ WHEELS: Dict[str, Wheels] = {
 class Laser:
     beams: int = 181  # over half a turn
     reach: float = 80.0  # [m]
+    no_return: float = 81.9  # [m] written where nothing is seen; as CARMEN's lasers do
 
     @property
     def angles(self) -> np.ndarray:
@@ -135,7 +135,7 @@ def measured(ranges: np.ndarray, place: Place, laser: Laser, draws: np.random.Ge
         ground = draws.uniform(5.0, 20.0, len(ranges))
         ranges = np.where(draws.random(len(ranges)) < 0.02, ground, ranges)
     seen = np.isfinite(ranges) & (ranges < laser.reach)
-    return np.where(seen, np.round(ranges + draws.normal(0.0, std), 2), NO_RETURN)
+    return np.where(seen, np.round(ranges + draws.normal(0.0, std), 2), laser.no_return)
 
 
 def scan_message(stamp: rospy.Time, laser: Laser, ranges: np.ndarray) -> LaserScan:
@@ -185,12 +185,14 @@ def main() -> None:
     parser.add_argument("--step", type=within(0.01, 10.0), default=0.5, help="from scan to scan [m] (default: 0.5)")
     parser.add_argument("--beams", type=whole(2, 100000), default=181, help="of the laser, over half a turn (default: 181)")
     parser.add_argument("--reach", type=within(0.1, 1000.0), default=80.0, help="of the laser [m] (default: 80)")
+    parser.add_argument("--no-return", type=within(0.1, 1000.0), default=Laser.no_return,
+                        help="what is written where nothing is seen [m], range_max being 80 (default: %(default)s)")
     parser.add_argument("--somebody", choices=("ahead", "towards"), help="walks along the robot's way")
     parser.add_argument("--seed", type=whole(0), default=SEED,
                         help="of all that is drawn: where doors, trees and pictures are, noise (default: %(default)s)")
     options = parser.parse_args()
     simulate(options.place, options.output_bag, options.output_tum, options.wheels, options.step,
-             Laser(options.beams, options.reach), options.somebody, options.seed)
+             Laser(options.beams, options.reach, options.no_return), options.somebody, options.seed)
 
 
 if __name__ == "__main__":

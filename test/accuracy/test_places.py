@@ -81,6 +81,10 @@ class PlacesTest(unittest.TestCase):
         print(f"\nmuseum, good wheels, 4 m of reach: {estimate:.2f} %")
         self.assertLess(estimate, 2.2)
 
+    def test_a_museum_beyond_reach_where_a_number_below_range_max_stands_for_nothing(self) -> None:
+        """An arc around the robot that goes along with it."""
+        self.check("museum", "drifting", 0.9, 0.045, 20.0, laser=Laser(reach=8.0, no_return=8.19))
+
     def test_a_castle_of_rough_stone(self) -> None:
         self.check("castle", "slipping", 0.14, 0.007, 12.0)
 

@@ -40,6 +40,13 @@ LaserScan constantScan(const SimulatedDrive& drive, int ms, float range) {
   return scan;
 }
 
+/// A scan with this number where the walls are farther than 2.5 m.
+LaserScan nearsightedScan(const SimulatedDrive& drive, int ms, float no_return) {
+  LaserScan scan = drive.scan(ms);
+  for (float& r : scan.ranges) r = r > 2.5F ? no_return : r;
+  return scan;
+}
+
 /// A scan in another place: a hall, no wall of which is near one of the room.
 LaserScan scanElsewhere(const SimulatedDrive& drive, int ms) {
   const World hall = closedPolygon({{-13.0, -11.0}, {15.0, -11.0}, {15.0, 12.0}, {-13.0, 12.0}});
@@ -105,6 +112,28 @@ void expectUnusableForASecond(float range) {
     expectCarriedOnByTheWheels(drive, driven.reports[i - 1], driven.reports[i]);
   }
   expectRecovers(driven, 3000, 0.04);
+}
+
+TEST(ScanOdometryFaults, ANumberBelowRangeMaxThatStandsForNothingIsAsGoodAsInfinity) {
+  const SimulatedDrive drive;
+  std::vector<Driven> driven;
+  const std::vector<float> numbers{std::numeric_limits<float>::infinity(), 2.56F};
+  for (const float no_return : numbers) {
+    Driven& robot = driven.emplace_back(drive);
+    for (int ms = 0; ms <= 8000; ms += 20) {
+      if (ms % 100 == 20) robot.scan(nearsightedScan(drive, ms - 13, no_return));
+      robot.odometry(ms);
+    }
+    ASSERT_EQ(robot.reports.size(), 80U) << no_return;
+    EXPECT_GE(robot.count(ScanOutcome::kUpdated), 70U) << no_return;
+    EXPECT_FLOAT_EQ(static_cast<float>(robot.reports.back().no_return), no_return);
+    EXPECT_LT(robot.latestError(8000).head<2>().norm(), 0.05) << no_return;
+  }
+  for (std::size_t i = 0; i < 80; ++i) {
+    EXPECT_EQ(driven[0].reports[i].estimate->odom_from_base.vector(),
+              driven[1].reports[i].estimate->odom_from_base.vector())
+        << i;
+  }
 }
 
 TEST(ScanOdometryFaults, ABlindLaserLeavesItToTheWheels) {

@@ -34,6 +34,7 @@ def bad_scans(good):
         ('nothing but infinity', changed(good, ranges=[INF, -INF] * (n // 2))),
         ('nothing but zero', changed(good, ranges=[0.0] * n)),
         ('nothing but the largest range', changed(good, ranges=[good.range_max + 1.0] * n)),
+        ('a number for no return', changed(good, ranges=[good.range_max - 1.0] * n)),
         ('no beam', changed(good, ranges=[])),
         ('one beam', changed(good, ranges=[1.0])),
         ('no angle between the beams', changed(good, angle_increment=0.0)),
@@ -47,10 +48,11 @@ def bad_scans(good):
 
 # What is said of a scan that the pipeline cannot use: the value, and what is expected.
 REASONS = {
-    'nothing but NaN': '0 of 360 ranges are finite and within [0.05, 30) m: expected at least 20',
+    'nothing but NaN': '0 of 360 ranges are finite and within [0.05, ',
     'nothing but infinity': '0 of 360 ranges',
     'nothing but zero': '0 of 360 ranges',
     'nothing but the largest range': '0 of 360 ranges',
+    'a number for no return': '0 of 360 ranges are finite and within [0.05, 29) m: expected at least 20',
     'no beam': '0 of 0 ranges',
     'one beam': '1 of 1 ranges',
     'no angle between the beams': 'angle_increment 0 with 360 ranges: expected values in rad, an increment that is not zero',
@@ -257,6 +259,8 @@ class BadInput(unittest.TestCase):
                      'scan on /scan not used: header.frame_id is empty: the laser\'s frame expected',
                      'scan on /scan not used: angle_min is -3.14159, angle_max 3.12414, angle_increment -0.0174533: an',
                      'scan on /scan not used: unusable: ',
+                     'scan on /scan: its driver writes 29 m where the laser has seen nothing, and a larger range_max: readings of '
+                     'that and more are not used; expected range_max in the message, or ~range_max, to be 29',
                      'scan on /scan not used: out of order: not newer than the estimate',
                      'odometry on /odom not used: header.stamp is 0: the time of the reading expected',
                      'odometry on /odom held back: header.stamp is ',

@@ -14,6 +14,7 @@
 #include "sckf_odometry/pipeline/imu_buffer.h"
 #include "sckf_odometry/pipeline/landmarks.h"
 #include "sckf_odometry/pipeline/laser_constants.h"
+#include "sckf_odometry/pipeline/no_return.h"
 #include "sckf_odometry/pipeline/odometry_buffer.h"
 #include "sckf_odometry/pipeline/pipeline_options.h"
 #include "sckf_odometry/pipeline/pose_updates.h"
@@ -96,6 +97,7 @@ class ScanOdometry {
   struct Laser {
     LaserConstants constants;
     SweepCheck sweeps;
+    NoReturn no_return;
     std::optional<Stamp> taken;  // of the last scan of this estimate
   };
   struct CarriedOn {

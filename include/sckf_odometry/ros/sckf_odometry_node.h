@@ -76,6 +76,7 @@ class ScKfOdometryNode {
   void advance();
   void passScansWithMount();
   void account(const ScanReport& report);
+  void warnOfNoReturn(const ScanReport& report);
   void warnOfSkew(const ScanReport& report);
   void accountPoses(bool scans_were_taken);
 
