@@ -216,7 +216,8 @@ void ScKfOdometryNode::setViewRate() {
 void ScKfOdometryNode::addScans(std::size_t laser, const InputGate::Scans& admission) {
   // Without odometry it is the scans that tell the time.
   if (admission.time_jump < Stamp(0) && pipeline_->onScansAlone()) followTime(admission.time_jump);
-  for (const Scan& scan : admission.passed) scans_without_mount_.push_back({laser, scan});
+  if (paused_) return health_.scans.ended("paused", admission.passed.size());
+  for (const RangeMessage& scan : admission.passed) scans_without_mount_.add(laser, scan);
   advance();
 }
 
@@ -259,22 +260,15 @@ void ScKfOdometryNode::advance() {
 }
 
 void ScKfOdometryNode::passScansWithMount() {
-  std::deque<ScanWithoutMount> waiting;
-  for (const auto& [laser, message] : scans_without_mount_) {
-    if (paused_) {
-      health_.scans.ended("paused");
-    } else if (const auto base_from_sensor = tf_.baseFrom(frameName(message.header.frame_id), &mount_problem_)) {
-      const MountedScan mounted = toMountedScan(message, *base_from_sensor, options_.node.cloud_input);
-      pipeline_->addScan(mounted.scan, mounted.base_from_laser, laser);
-      health_.scanPassed();
-    } else {
-      waiting.push_back({laser, message});
-    }
+  for (const auto& [scan, base_from_sensor] : scans_without_mount_.take(tf_)) {
+    const MountedScan mounted = toMountedScan(scan.message, base_from_sensor, options_.node.cloud_input);
+    pipeline_->addScan(mounted.scan, mounted.base_from_laser, scan.laser);
+    health_.scanPassed();
   }
-  scans_without_mount_ = std::move(waiting);
-  if (scans_without_mount_.size() <= static_cast<std::size_t>(options_.pipeline.max_waiting_scans)) return;
-  gate_.refuseScan(scans_without_mount_.front().laser, "no mount", "its mount is not known: " + mount_problem_);
-  scans_without_mount_.pop_front();
+  const auto most = static_cast<std::size_t>(options_.pipeline.max_waiting_scans);
+  while (const std::optional<std::size_t> laser = scans_without_mount_.giveUpBeyond(most)) {
+    gate_.refuseScan(*laser, "no mount", "its mount is not known: " + scans_without_mount_.problem());
+  }
 }
 
 void ScKfOdometryNode::account(const ScanReport& report) {
@@ -396,7 +390,7 @@ std::string ScKfOdometryNode::waitingFor() const {
     return "odometry on TF, " + node.tf_odometry_frame + " -> " + node.base_frame + " " + tf_.odometryProblem();
   }
   if (!health_.odometry.anyUsed()) return "odometry on " + odometry_source_;
-  if (!scans_without_mount_.empty()) return "the mount of the laser: " + mount_problem_;
+  if (!scans_without_mount_.empty()) return "the mount of the laser: " + scans_without_mount_.problem();
   const std::string silent = health_.topicNotHeard();
   if (!silent.empty()) return "scans on " + silent;
   if (!imu_.mountProblem().empty()) return "the mount of the IMU: " + imu_.mountProblem();

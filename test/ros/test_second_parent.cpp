@@ -5,19 +5,13 @@
 #include <string>
 
 #include "sckf_odometry/ros/second_parent.h"
+#include "transforms.h"
 
 namespace sckf::test {
 namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
-
-geometry_msgs::TransformStamped transform(const std::string& parent, const std::string& child) {
-  geometry_msgs::TransformStamped transform;
-  transform.header.frame_id = parent;
-  transform.child_frame_id = child;
-  return transform;
-}
 
 /// What is told if a node publishes one parent of one frame on /tf.
 std::string told(const NodeOptions& options, const std::string& parent, const std::string& child,

@@ -3,19 +3,14 @@
 #include "sckf_odometry/ros/conversions.h"
 #include "sckf_odometry/ros/tf_input.h"
 #include "text_matchers.h"
+#include "transforms.h"
 
-namespace sckf {
+namespace sckf::test {
 namespace {
 
 constexpr Stamp kJump = std::chrono::seconds(1);
 
 Stamp at(double time) { return toStamp(ros::Time(time)); }
-
-tf2_msgs::TFMessage transform(const std::string& frame, const std::string& child, double time, const SE2& pose) {
-  tf2_msgs::TFMessage message;
-  message.transforms.push_back(toTransform(pose, at(time), frame, child));
-  return message;
-}
 
 TEST(TfInput, AMountIsKnownWhenTfHasToldIt) {
   TfInput tf("base_link", "", kJump);
@@ -129,4 +124,4 @@ TEST(TfInput, OdometryOfAnotherFrameOfTheRobotIsMovedOrRefused) {
 }
 
 }  // namespace
-}  // namespace sckf
+}  // namespace sckf::test

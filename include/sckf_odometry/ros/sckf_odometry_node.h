@@ -12,7 +12,6 @@
 #include <sensor_msgs/PointCloud2.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include <deque>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -28,6 +27,7 @@
 #include "sckf_odometry/ros/parameters.h"
 #include "sckf_odometry/ros/pose_update_input.h"
 #include "sckf_odometry/ros/reconfigure.h"
+#include "sckf_odometry/ros/scans_without_mount.h"
 #include "sckf_odometry/ros/second_parent.h"
 #include "sckf_odometry/ros/services.h"
 #include "sckf_odometry/ros/state_file.h"
@@ -48,8 +48,6 @@ class ScKfOdometryNode {
   ~ScKfOdometryNode();
 
  private:
-  using Scan = InputGate::Scan;
-
   void subscribe(ros::NodeHandle& nh);
   void startTimers(ros::NodeHandle& nh);
   Services::Actions serviceActions();
@@ -108,12 +106,7 @@ class ScKfOdometryNode {
   InputGate gate_;
   ImuInput imu_;
   PoseUpdateInput pose_updates_;
-  struct ScanWithoutMount {
-    std::size_t laser;
-    Scan message;
-  };
-  std::deque<ScanWithoutMount> scans_without_mount_;
-  std::string mount_problem_;  // of the newest scan that waits for its mount
+  ScansWithoutMount scans_without_mount_;
   bool paused_ = false;
 
   // What calls back comes last, so that it is the first to go.
