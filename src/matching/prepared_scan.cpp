@@ -128,8 +128,7 @@ ScannedPoints readings(const LaserScan& scan, const Eigen::Isometry3d& base_from
   for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
     const auto told = static_cast<double>(scan.ranges[i]);
     const double range = told + offset;
-    const bool read = std::isfinite(told) && told > 0.0 && told >= range_min && told < range_max && range > 0.0;
-    if (!read) continue;
+    if (!isReading(told, range_min, range_max) || !(range > 0.0)) continue;
     const double bearing = scan.angle_min + static_cast<double>(i) * scan.angle_increment;
     const Eigen::Vector3d ray = base_from_laser.linear() * Eigen::Vector3d(std::cos(bearing), std::sin(bearing), 0.0);
     points.beam.push_back(static_cast<int>(i));

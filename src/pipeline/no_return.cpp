@@ -21,7 +21,7 @@ void NoReturn::look(const LaserScan& scan) {
   int most = 0;   // … and wherever they are most
   for (const float told : scan.ranges) {
     const auto range = static_cast<double>(told);
-    const bool read = std::isfinite(range) && range > 0.0 && range >= scan.range_min && range < scan.range_max;
+    const bool read = isReading(range, scan.range_min, scan.range_max);
     if (read && range > largest) {
       largest = range;
       beams = most = 0;

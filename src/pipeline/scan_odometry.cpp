@@ -156,7 +156,7 @@ ScanReport ScanOdometry::take(const WaitingScans::Entry& waiting) {
   useHeading(report);  // (34)
   report.wheels_known = std::exchange(wheels_known_, true);
   laser.no_return.look(waiting.scan);
-  report.no_return = laser.no_return.value();
+  report.no_return = laser.no_return;
   report.scan = prepared(waiting, report.reason);
   if (report.scan) {
     correctBy(report);  // (16)-(23)

@@ -299,14 +299,14 @@ void ScKfOdometryNode::accountPoses(bool scans_were_taken) {
 }
 
 void ScKfOdometryNode::warnOfNoReturn(const ScanReport& report) {
-  if (report.no_return == ScanReport::kNever) return;
+  if (!report.no_return.isFound()) return;
   const std::string& topic = scan_topics_[report.laser];
   std::ostringstream text;
-  text << "scan on " << topic << ": its driver writes " << report.no_return
+  text << "scan on " << topic << ": its driver writes " << report.no_return.value()
        << " m where the laser has seen nothing, and a larger range_max: readings of that and more are not used; "
           "expected "
           "range_max in the message, or ~range_max, to be "
-       << report.no_return;
+       << report.no_return.value();
   warnings_.warnOnce("no return " + topic, text.str());
 }
 

@@ -33,7 +33,7 @@ void ReplayStatistics::add(const ScanReport& report, double time) {
   older_references_ += static_cast<std::size_t>(report.older_references);
   landmarks_used_ += static_cast<std::size_t>(report.landmarks_used);
   constants_ = report.laser_constants;
-  no_return_ = std::min(no_return_, report.no_return);
+  no_return_ = std::min(no_return_, report.no_return.value());
   most_landmarks_ = std::max(most_landmarks_, report.landmarks.size());
 }
 
@@ -52,7 +52,7 @@ void ReplayStatistics::print(double log_duration, double wall_time) const {
     std::printf("older references used %zu times, by %zu scans that became one\n", older_references_,
                 reference_times_.size());
   }
-  if (no_return_ != ScanReport::kNever) {
+  if (std::isfinite(no_return_)) {
     std::printf("no return: readings of %g m and more, although range_max is larger\n", no_return_);
   }
   printConstant("range offset", constants_.range_offset, "m");

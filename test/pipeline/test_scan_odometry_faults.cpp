@@ -126,7 +126,7 @@ TEST(ScanOdometryFaults, ANumberBelowRangeMaxThatStandsForNothingIsAsGoodAsInfin
     }
     ASSERT_EQ(robot.reports.size(), 80U) << no_return;
     EXPECT_GE(robot.count(ScanOutcome::kUpdated), 70U) << no_return;
-    EXPECT_FLOAT_EQ(static_cast<float>(robot.reports.back().no_return), no_return);
+    EXPECT_FLOAT_EQ(static_cast<float>(robot.reports.back().no_return.value()), no_return);
     EXPECT_LT(robot.latestError(8000).head<2>().norm(), 0.05) << no_return;
   }
   for (std::size_t i = 0; i < 80; ++i) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <vector>
 
 namespace sckf {
@@ -29,5 +30,10 @@ struct LaserScan {
   double range_max = 0.0;        ///< [m]
   std::vector<float> ranges;     ///< [m]
 };
+
+/// Whether what a beam tells [m] is a reading within [range_min, range_max).
+inline bool isReading(double range, double range_min, double range_max) {
+  return std::isfinite(range) && range > 0.0 && range >= range_min && range < range_max;
+}
 
 }  // namespace sckf

@@ -14,6 +14,8 @@ class NoReturn {
  public:
   void look(const LaserScan& scan);
 
+  bool isFound() const { return value_ < std::numeric_limits<double>::infinity(); }
+
   /// [m] Readings of this and more are none; infinite where they are what they seem to be.
   double value() const { return value_; }
 

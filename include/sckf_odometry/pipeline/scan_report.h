@@ -1,7 +1,6 @@
 // What comes out of the pipeline: estimates, and what became of each scan.
 #pragma once
 
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,6 +8,7 @@
 
 #include "sckf_odometry/matching/scan_matcher.h"
 #include "sckf_odometry/pipeline/laser_constants.h"
+#include "sckf_odometry/pipeline/no_return.h"
 #include "sckf_odometry/pipeline/pose_updates.h"
 #include "sckf_odometry/pipeline/sweep.h"
 #include "sckf_odometry/pipeline/twist_window.h"
@@ -58,8 +58,6 @@ struct LandmarkView {
 };
 
 struct ScanReport {
-  static constexpr double kNever = std::numeric_limits<double>::infinity();
-
   Stamp stamp{0};
   std::size_t laser = 0;
   ScanOutcome outcome = ScanOutcome::kReference;
@@ -82,7 +80,7 @@ struct ScanReport {
   std::optional<MapEstimate> in_map;         ///< then; empty before the first absolute pose
   Deskewing deskewing = Deskewing::kOff;     ///< what became of the motion during the scan
   std::string deskewing_problem;             ///< in words, where it could not be undone
-  double no_return = kNever;                 ///< [m] readings of this and more were taken for none: see NoReturn
+  NoReturn no_return;                        ///< of its laser, found by then
   int landmarks_used = 0;                    ///< so many landmarks corrected the estimate …
   std::vector<LandmarkView> landmarks;       ///< … of these, after the scan
   double match_time = 0.0;                   ///< [s] spent on the comparison with the reference …

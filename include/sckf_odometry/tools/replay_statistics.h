@@ -23,7 +23,7 @@ class ReplayStatistics {
   std::map<Deskewing, std::size_t> deskewing_;
   std::size_t older_references_ = 0;
   LaserConstants constants_;               // of the last scan's laser
-  double no_return_ = ScanReport::kNever;  // [m] the least that was taken for one
+  double no_return_ = NoReturn().value();  // [m] the least that was taken for one
   std::size_t landmarks_used_ = 0;
   std::size_t most_landmarks_ = 0;
   std::vector<double> times_;            // [s] of each scan …
